@@ -263,3 +263,18 @@ def test_python_code_of_the_package_calls_no_inner_kernel():
         called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call)
                   and isinstance(node.func, ast.Name) and node not in compiled}
         assert called & inner == set(), path
+
+
+@pytest.mark.parametrize('room', ['geometry', 'solver'])
+def test_kernels_that_python_code_does_not_call_are_inner_kernels(room):
+    """Each other one is optimised and translated once more than where it is called."""
+    trees = [ast.parse(path.read_text()) for path in PACKAGE.rglob('*.py')]
+    used = set()
+    for tree in trees:
+        compiled = {node for each in decorated(tree) for node in ast.walk(each)}
+        used |= {node.id for node in ast.walk(tree)
+                 if isinstance(node, ast.Name) and node not in compiled}
+    outer = {each.name for path in (PACKAGE / room).rglob('*.py')
+             for each in decorated(ast.parse(path.read_text()), {'kernel', 'allocating_kernel'})}
+    assert outer
+    assert outer - used == set()

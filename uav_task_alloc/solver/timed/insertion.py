@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from uav_task_alloc.geometry.outline import Ints
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import SIGNED
 from uav_task_alloc.solver.timed import columns as at
@@ -123,7 +123,7 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
     return place, kind, least
 
 
-@kernel
+@inner_kernel
 def place_anywhere(a: TimedArrays, r: TimedRoutes, t: int) -> tuple[int, int, float]:
     """The cheapest place in all routes: (node before or -1, kind, cost). O(n)."""
     place, kind, least = -1, NO_VISIT, math.inf
@@ -135,7 +135,7 @@ def place_anywhere(a: TimedArrays, r: TimedRoutes, t: int) -> tuple[int, int, fl
     return place, kind, least
 
 
-@kernel
+@inner_kernel
 def insert_task(a: TimedArrays, r: TimedRoutes, t: int, c: int, kind: int) -> None:
     """Insert t after node c, turned or with a visit of the base if kind says so. O(tasks)."""
     if has_paths(a):
@@ -199,7 +199,7 @@ def unlink(a: TimedArrays, r: TimedRoutes, t: int) -> None:
     r.route[u, at.TASKS] -= 1.0
 
 
-@kernel
+@inner_kernel
 def insert_in_order(a: TimedArrays, r: TimedRoutes, tasks: Ints, prizes: bool,
                     rng: RngState) -> int:
     """Insert task nodes in the given order, each where it costs least; returns how many failed.

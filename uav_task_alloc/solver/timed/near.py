@@ -78,11 +78,19 @@ def _add_neighbour(a: TimedArrays, i: int, kept: int, j: int, pace: float) -> in
 
 
 @kernel
-def fill_near(a: TimedArrays, known: KnownNear, pace: float) -> None:
-    """Fill a.near, a.near_length and a.near_count. O(n k) where known, else O(n^2).
+def fill_near(a: TimedArrays, known: KnownNear, pace: float, squares: Floats) -> None:
+    """Fill all neighbours of `a`. O(n (k + classes)) where known, else O(n (n + classes)).
 
-    known: neighbours of an earlier problem; pace: [s/m] of the fastest UAV, horizontally.
+    known: neighbours of an earlier problem; pace: [s/m] of the fastest UAV, horizontally;
+    squares: (c) scratch.
     """
+    _fill_near_tasks(a, known, pace)
+    _fill_near_classes(a, squares)
+
+
+@inline_kernel
+def _fill_near_tasks(a: TimedArrays, known: KnownNear, pace: float) -> None:
+    """Fill a.near, a.near_length and a.near_count. O(n k) where known, else O(n^2)."""
     n = len(a.near)
     for i in range(n):
         kept, before = 0, known.then[i]
@@ -101,8 +109,8 @@ def fill_near(a: TimedArrays, known: KnownNear, pace: float) -> None:
         a.near_count[i] = kept
 
 
-@kernel
-def fill_near_classes(a: TimedArrays, squares: Floats) -> None:
+@inline_kernel
+def _fill_near_classes(a: TimedArrays, squares: Floats) -> None:
     """Fill a.near_class and REMOTE with the nearest starts of classes. O(n classes).
 
     squares: (c) scratch.

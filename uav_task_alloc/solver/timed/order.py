@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, Links, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.segments import join, update
 from uav_task_alloc.solver.timed.ways import TURN_BIT, face, has_paths, is_task, is_turned
 
 
-@kernel
-def reset(a: TimedArrays, r: TimedRoutes) -> None:
+@inline_kernel
+def _reset(a: TimedArrays, r: TimedRoutes) -> None:
     """Make all routes empty. O(nodes)."""
     r.sums[:] = 0.0
     r.counts[:] = 0
@@ -36,7 +36,7 @@ def reset(a: TimedArrays, r: TimedRoutes) -> None:
         update(a, r, LINK(u), LINK(u), LINK(end), 0.0)
 
 
-@kernel
+@inner_kernel
 def route_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
     """Write the node after each node of a route into order (nodes); itself where in none.
 
@@ -53,14 +53,14 @@ def route_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
 @kernel
 def set_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
     """Set all routes as `route_order` wrote them. O(nodes)."""
-    reset(a, r)
+    _reset(a, r)
     for u in range(a.uavs):
         i, end = LINK(u), a.ends + u
         metres, load, tasks = 0.0, 0.0, 0.0
         if order[u] == end:
             continue
         while i != end:
-            j = order[i] & ~TURN_BIT
+            j = LINK(order[i] & ~TURN_BIT)
             if has_paths(a) and is_task(a, j):
                 face(a, r, j, order[j] >= TURN_BIT)
             join(a, r, LINK(u), i, j)

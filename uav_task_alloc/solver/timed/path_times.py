@@ -11,7 +11,7 @@ import numpy as np
 from uav_task_alloc.geometry.distances import Distances, Pairs
 from uav_task_alloc.geometry.numba_pointers import call_float, floats_at, ints_at
 from uav_task_alloc.geometry.scene import time_address
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import inner_allocating_kernel
 
 TABLE_SIZE = 1 << 18  # times kept; a power of two
 Speeds = tuple[float, float, float]  # [m/s] cruise, climb, descent
@@ -45,7 +45,7 @@ def path_times(distances: Distances, classes: Sequence[Speeds]) -> PathTimes:
     return times
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def path_seconds(pairs: Pairs, times: PathTimes, speeds: int, i: int, j: int) -> float:
     """Time [s] along the path from point i to point j, whose length is known. O(1) once known.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.segments import after_leg, leg_of, slot_of
@@ -129,13 +129,13 @@ def _lasts(a: TimedArrays, r: TimedRoutes, u: int, c: int, t: int, then: int, se
     return float(lasted + wait + r.row[then, at.LASTS])
 
 
-@kernel
+@inner_kernel
 def cost_at(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int) -> float:
     """As place_cost without a bound, for kernels that need few."""
     return float(place_cost(a, r, u, t, c, math.inf))
 
 
-@kernel
+@inner_kernel
 def cheapest_direction(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int) -> int:
     """The kind of the cheaper direction of t after node c of UAV u's route; -1: none may be. O(1).
 

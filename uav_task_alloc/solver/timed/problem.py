@@ -22,8 +22,8 @@ from uav_task_alloc.solver.timed.arrays import (
     aligned_zeros,
     node_count,
 )
-from uav_task_alloc.solver.timed.near import fill_near, fill_near_classes, known_near
-from uav_task_alloc.solver.timed.order import reset
+from uav_task_alloc.solver.timed.near import fill_near, known_near
+from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.path_times import Speeds, path_times
 from uav_task_alloc.solver.timed.ways import first_ways
 
@@ -324,8 +324,8 @@ def _fill(problem: Problem, a: TimedArrays, known: TimedProblem | None) -> float
     pace = float(a.pace[:, 0].min())
     index = known.base.index if known else {}
     then = np.array([index.get(task.id, -1) for task in problem.tasks], np.int64)
-    fill_near(a, known_near(a, known.arrays if known else None, then), pace)
-    fill_near_classes(a, np.empty(max(1, a.near_class.shape[1])))
+    fill_near(a, known_near(a, known.arrays if known else None, then), pace,
+              np.empty(max(1, a.near_class.shape[1])))
     some = a.near_count > 0
     legs = a.near_length[some, 0] if some.any() else a.fixed[a.uavs:a.ends, at.REMOTE]
     metres = max(float(legs.mean()), 1e-6)
@@ -374,5 +374,7 @@ def empty_timed_routes(a: TimedArrays) -> TimedRoutes:
         np.zeros((a.uavs, at.ROUTE_COLUMNS)), np.zeros(at.SUM_COLUMNS), np.zeros(2, np.int64),
         np.zeros(max(1, a.first_member.size - 1), np.int64),
         first_ways(nodes, a.far, a.uavs), a.first_member.copy())
-    reset(a, routes)
+    order = np.arange(nodes).astype(LINK)
+    order[:a.uavs] += LINK(a.ends)
+    set_order(a, routes, order)
     return routes

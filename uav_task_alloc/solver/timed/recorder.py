@@ -41,8 +41,7 @@ class TimedRecorder(Progress):
 
     def _is_better(self, one: Incumbent, other: Incumbent) -> bool:
         cost, worth = one.score.tolist()
-        return bool(is_improvement(self.problem.arrays, cost, worth, other.score,
-                                   self.problem.prizes))
+        return bool(is_improvement(cost, worth, other.score, self.problem.prizes))
 
     @staticmethod
     def _copy(source: Incumbent, to: Incumbent) -> None:

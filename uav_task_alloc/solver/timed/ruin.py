@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uav_task_alloc.geometry.outline import Floats, Ints
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.rng import RngState, below, uniform
 from uav_task_alloc.solver.ruin import MAX_STRING, PRESERVE_RATE, SPLIT_RATE
 from uav_task_alloc.solver.timed import columns as at
@@ -221,7 +221,7 @@ def _seed(a: TimedArrays, r: TimedRoutes, w: Round, rng: RngState) -> Any:
     return LINK(a.uavs + below(rng, a.ends - a.uavs))
 
 
-@kernel
+@inner_kernel
 def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, most_absent: int,
                  skipped: float, rng: RngState) -> Any:
     """Remove about `mean` tasks in strings of routes around a random task; returns that. O(k).
@@ -310,7 +310,7 @@ def insert_saved(a: TimedArrays, r: TimedRoutes, w: Round, t: int, place: int,
     insert_task(a, r, t, place, kind)
 
 
-@kernel
+@inner_kernel
 def open_route(a: TimedArrays, r: TimedRoutes, w: Round, t: int) -> None:
     """Insert t into an empty route, whatever that costs, if one may serve it. O(classes)."""
     for m in range(a.near_class.shape[1]):
@@ -324,7 +324,7 @@ def open_route(a: TimedArrays, r: TimedRoutes, w: Round, t: int) -> None:
             break
 
 
-@kernel
+@inner_kernel
 def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, by_value: float,
                    blinks: float, rng: RngState) -> None:
     """Insert removed tasks where each costs least. O(removed k).

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uav_task_alloc.geometry.outline import Floats
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
@@ -74,8 +74,7 @@ class Rises(NamedTuple):
 
 
 @kernel
-def is_improvement(a: TimedArrays, cost: float, worth: float, score: Floats,
-                   prizes: bool) -> bool:
+def is_improvement(cost: float, worth: float, score: Floats, prizes: bool) -> bool:
     """Whether a cost and value are better than a score."""
     less = score[BEST_COST] * (1.0 - 1e-12) - TOLERANCE
     if prizes:
@@ -96,20 +95,20 @@ def _announced(a: TimedArrays, r: TimedRoutes) -> float:
     return cost
 
 
-@kernel
+@inner_kernel
 def record(a: TimedArrays, r: TimedRoutes, best: Incumbent, prizes: bool) -> bool:
     """Keep the routes if they are allowed and better than the best; whether. O(nodes)."""
     if r.counts[at.INFEASIBLE] > 0:
         return False
     cost = true_cost(a, r) + (r.sums[at.UNSERVED_COST] if prizes else _announced(a, r))
-    if not is_improvement(a, cost, r.sums[at.SERVED_WORTH], best.score, prizes):
+    if not is_improvement(cost, r.sums[at.SERVED_WORTH], best.score, prizes):
         return False
     best.score[BEST_COST], best.score[BEST_WORTH] = cost, r.sums[at.SERVED_WORTH]
     route_order(a, r, best.order)
     return True
 
 
-@kernel
+@inner_kernel
 def _update_prices(a: TimedArrays, r: TimedRoutes, w: Round, rises: Rises) -> None:
     """Adapt the prices of excess and of tasks in no route. O(n)."""
     for c in range(4):

@@ -13,7 +13,7 @@ import math
 
 from uav_task_alloc.geometry.distances import length
 from uav_task_alloc.geometry.outline import Floats
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.path_times import path_seconds
@@ -301,7 +301,7 @@ def _trip_backward(a: TimedArrays, r: TimedRoutes, u: int, last: int) -> int:
     return int(i)
 
 
-@kernel
+@inner_kernel
 def update_whole(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None:
     """Update UAV u's route from end to end. O(tasks)."""
     head, end = u, a.ends + u

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.places import cost_of_delay, cost_of_excess, fits_trip
@@ -137,7 +137,7 @@ def free_visit(a: TimedArrays, r: TimedRoutes, u: int) -> int:
     return -1
 
 
-@kernel
+@inner_kernel
 def cheapest_split(a: TimedArrays, r: TimedRoutes, t: int, c: int,
                    least: float) -> tuple[int, float]:
     """The kind of place with a base visit after node c that costs least, below `least`. O(1)."""
