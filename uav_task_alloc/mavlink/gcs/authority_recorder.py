@@ -68,16 +68,17 @@ class AuthorityRecorder:
             return
         if state.unexplained is None:  # else a restarted bridge would accept the new mode
             self._mode = state.mode
+        position = self._evidence.mission_position()
         fields = (
             authority.state, authority.why, authority.since, authority.killed, authority.landed,
             authority.until_landing, state.flown, self._mode, state.armed,
             tuple(dict.fromkeys(mode for mode, _ in sent.modes)) if sent.modes else (),
             sent.arm_until > -math.inf and not state.armed and authority.held,
             state.replacing_since, sent.climb, tuple(self.marks.values()),
-            *self._evidence.mission_position(), self._evidence.uploading(),
+            *position, self._evidence.uploading(),
             self._last_position(),
             None if math.isnan(state.landed_battery) else round(state.landed_battery, 3),
-            self._evidence.pieces(), self._evidence.ahead())
+            self._evidence.pieces(), self._evidence.ahead(position[1]))
         if fields == self._fields:  # as after most messages
             return
         self._fields, record = fields, AuthorityRecord(*fields)

@@ -95,9 +95,10 @@ class MissionEvidence:
             return None, None, False
         if self._checksum is None or self._checksum[0] is not held:
             self._checksum = held, checksum(held)
-        passed = progress.passed_in_order  # credited by a restarted bridge
-        current = next((n for n, item in enumerate(progress.items[:progress.current])
-                        if item.task in passed), progress.current)
+        passed, current = progress.passed_in_order, progress.current
+        if passed:  # credited by a restarted bridge
+            current = next((n for n, item in enumerate(held[:current]) if item.task in passed),
+                           current)
         return self._checksum[1], current, progress.has_arrived(current)
 
     def pieces(self) -> tuple[PieceMark, ...]:
@@ -105,9 +106,9 @@ class MissionEvidence:
         progress = self._onboard.progress
         return progress.coverage.marks(progress.completed)
 
-    def ahead(self) -> tuple[TaskMark, ...]:
-        """The next tasks on board from the item being flown on, at most _AHEAD."""
-        held, (_, current, _) = self._onboard.progress.items, self.mission_position()
+    def ahead(self, current: int | None) -> tuple[TaskMark, ...]:
+        """The next tasks on board, at most _AHEAD, from `current` of `mission_position` on."""
+        held = self._onboard.progress.items
         if current is None:
             return ()
         if self._ahead[0] is not held or self._ahead[1] != current:

@@ -31,6 +31,7 @@ from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.rally_transfer import RALLY_BUDGET, RallyTransfer
 from uav_task_alloc.mavlink.gcs.return_path import zones_across_path
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
@@ -87,6 +88,8 @@ class VehicleFence:
         self._chosen_for: object = None
         self._choose_at = self._changed_at = -1e9  # [s]
         self._reported = ''
+        self._blocks_for: tuple[FlightSpace, tuple[tuple[Item, ...], ...]] | None = None
+        self._is_blocked = False  # the answer of `_blocks` for that
 
     def _save(self, store: str, own: frozenset[ItemKey], memory: FenceMemory) -> None:
         self._own[store] = own
@@ -324,6 +327,9 @@ class VehicleFence:
         if self.verified or transfer.wanted is None or (
                 transfer.held is not None and not transfer.is_own):
             return False
-        space = replace(self._space(), position=None)
-        return any(space.enters(shape) for items in transfer.possible
-                   for shape in shapes_of_items(items, self._origin))
+        key = replace(self._space(), position=None), transfer.possible
+        if key != self._blocks_for:  # else as at the messages before
+            self._blocks_for = key
+            self._is_blocked = any(key[0].enters(shape) for items in key[1]
+                                   for shape in shapes_of_items(items, self._origin))
+        return self._is_blocked

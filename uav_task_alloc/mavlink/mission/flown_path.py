@@ -48,6 +48,7 @@ class FlownPath:
 
     def __init__(self) -> None:
         self._samples: list[PositionSample] = []
+        self._speeds: list[float] = []  # [m/s] of each sample
         self.late = 0  # how many samples came after a newer one
 
     @property
@@ -77,13 +78,15 @@ class FlownPath:
         """Add a sample; O(1) where they arrive in order."""
         if not self._samples or sample.t > self._samples[-1].t:
             self._samples.append(sample)
+            self._speeds.append(math.hypot(*sample.velocity))
         else:
             self.late += 1
             at = bisect_left(self._samples, sample.t, key=lambda one: one.t)
             if self._samples[at].t != sample.t:
                 self._samples.insert(at, sample)
+                self._speeds.insert(at, math.hypot(*sample.velocity))
         if len(self._samples) > _KEPT + 100:
-            del self._samples[:100]
+            del self._samples[:100], self._speeds[:100]
 
     def jumps(self, sample: PositionSample) -> bool:
         """Whether a new sample is too far from the newest one to have been flown."""
@@ -97,6 +100,7 @@ class FlownPath:
     def clear(self) -> None:
         """Drop all samples: the vehicle's clock has restarted."""
         self._samples.clear()
+        self._speeds.clear()
 
     def visited(self, point: Point, radius: float, hold: float, since: float,
               until: float = math.inf, close: float = CLOSE) -> Visit:
@@ -170,7 +174,7 @@ class FlownPath:
     @property
     def fastest(self) -> float:
         """The highest speed [m/s] of late; the usual one where it has hardly moved."""
-        speeds = [math.hypot(*sample.velocity) for sample in self._samples[-200:]]
+        speeds = self._speeds[-200:]
         moving = sum(speed > _HOLD_SPEED for speed in speeds)
         return max(5.0 if moving >= _FEW else _USUAL_SPEED, *speeds)
 

@@ -263,6 +263,8 @@ class PieceCoverage:
 
     def marks(self, completed: Container[str]) -> tuple[PieceMark, ...]:
         """What a restarted bridge has to know of the pieces that are partly flown."""
+        if not self._partly:
+            return ()
         for name in [name for name in self._partly if name in completed]:
             del self._partly[name]
         rows = ((name, self._pieces[name]) for name in self._partly)

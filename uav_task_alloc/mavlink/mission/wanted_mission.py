@@ -222,12 +222,13 @@ class WantedMission:
     def has_enough(self, held: tuple[Item, ...]) -> bool:
         """Whether at least half a horizon of the latest list is still on board."""
         assert self.tasks is not None
+        rest = held[self._progress.current or 0:]
+        stops = sum(item.completes for item in rest)
+        if stops < max(1, (self.horizon.stops or 0) // 2):
+            return False  # the items of a list of thousands take a second
         open_tasks = self.tasks.without({*self._progress.completed, *self._refused})
         everything = replace(open_tasks, returns=False, end_via=(), stops=tuple(
             map(self._progress.coverage.rest, open_tasks.stops)))
         wanted = self._items_of(everything)
-        rest = held[self._progress.current or 0:]
-        stops = sum(item.completes for item in rest)
         first = next((n for n, item in enumerate(wanted) if item.completes), 0)
-        return stops >= max(1, (self.horizon.stops or 0) // 2) and any(
-            all_alike(wanted[n:n + len(rest)], rest) for n in range(first + 1))
+        return any(all_alike(wanted[n:n + len(rest)], rest) for n in range(first + 1))
