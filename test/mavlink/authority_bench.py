@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from bench_copy import kept
 from flight_bench import FlightBench, Store
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -111,6 +112,7 @@ def allowed_actions(authority):
         authority.state]
 
 
+@kept
 def flying(kind, names=LONG, **kwargs):
     """HELD, on the leg to the first task, and a heartbeat has shown the mission mode."""
     bench = AuthorityBench(kind, **kwargs).discover()
@@ -121,6 +123,7 @@ def flying(kind, names=LONG, **kwargs):
     return bench
 
 
+@kept
 def flown_up_by_pilot(kind, names=LONG, **kwargs):
     """NONE, hovering in a stick mode, with the list on board."""
     bench = AuthorityBench(kind, takeoff=False, **kwargs)
@@ -150,6 +153,7 @@ def upload_by_another(bench, n=1, items=1):
             x, y, 540.0, 0), n)
 
 
+@kept
 def suspended(kind, cause=Suspension.FAILSAFE, **kwargs):
     """SUSPENDED in flight, in the mission mode."""
     bench = flying(kind, **kwargs)
@@ -169,6 +173,7 @@ def suspended(kind, cause=Suspension.FAILSAFE, **kwargs):
     return bench
 
 
+@kept
 def lost(kind, **kwargs):
     """LOST in flight: the pilot holds it in a stick mode."""
     bench = flying(kind, **kwargs)
@@ -182,6 +187,7 @@ def in_flight(kind, state, **kwargs):
     return {H: flying, S: suspended, L: lost, N: flown_up_by_pilot}[state](kind, **kwargs)
 
 
+@kept
 def on_ground(kind, state, **kwargs):
     """On the ground, disarmed, past boot, with a list on board, nothing else going on."""
     takeoff = kwargs.pop('takeoff', state is not N)

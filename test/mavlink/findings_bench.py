@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from bench_copy import kept
 from flight_bench import FlightBench, places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -39,6 +40,7 @@ class FindingsBench(FlightBench):
         return [note for note in self.notes if all(word in note for word in words)]
 
 
+@kept
 def flying(kind, names='ABC', **kwargs):
     """A vehicle flying to the first of some tasks."""
     lists = {key: kwargs.pop(key) for key in ('service', 'side', 'returns') if key in kwargs}

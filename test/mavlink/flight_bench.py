@@ -2,6 +2,7 @@
 """Connects a ground station to simulated vehicles by frames in virtual time."""
 import random
 
+from bench_copy import kept
 from mission_bench import ORIGIN, OURS, Line, make_vehicle, task_list
 
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
@@ -130,6 +131,7 @@ class FlightBench:
             self.line.send('down', n, self.codecs['down', n], m, self.now)
 
 
+@kept
 def flying(kind, names='ABC', **kwargs):
     """A vehicle flying to the first of some tasks."""
     service = kwargs.pop('service', 0.0)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Connects an upload to a simulated autopilot by frames in virtual time, over a lossy line."""
 import heapq
-import itertools
 import random
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -59,7 +58,7 @@ class Line:
         self.cut = False
         self.tampers = []
         self.log = []  # (now, direction, message)
-        self._flying, self._number = [], itertools.count()
+        self._flying, self._number = [], 0
 
     def send(self, direction, key, codec, message, now):
         self.log.append((now, direction, message))
@@ -74,8 +73,8 @@ class Line:
         for delay, m in carried:
             frame = codec.pack(m) if not isinstance(m, bytes) else m  # lost frames have a seq too
             if not self.cut and self.rng.random() >= self.loss:
-                heapq.heappush(self._flying, (now + delay, next(self._number), direction, key,
-                                              frame))
+                self._number += 1
+                heapq.heappush(self._flying, (now + delay, self._number, direction, key, frame))
 
     def due(self, now):
         while self._flying and self._flying[0][0] <= now + 1e-9:
