@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from uav_task_alloc.solver import chain_q, routes
 from uav_task_alloc.solver.colony import ColonyParams
@@ -78,7 +78,7 @@ def confidence(row: Sequence[float]) -> tuple[float, float]:
     if n < 2:
         return float(np.mean(row)), math.inf
     spread = float(np.std(row, ddof=1)) / math.sqrt(n)
-    return float(np.mean(row)), float(stats.t.ppf(0.975, n - 1)) * spread
+    return float(np.mean(row)), float(stdtrit(n - 1, 0.975)) * spread
 
 
 def _problems(size: str, runs: int) -> list[tuple[Problem, int]]:
