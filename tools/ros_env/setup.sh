@@ -8,14 +8,17 @@
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 ros=$(realpath -m "${1:-.ros}")
-trap 'exit 130' INT  # not the tracebacks of the programs that end with it
-logged() { "$@" > "$ros/setup.log" 2>&1 || { tail -n 20 "$ros/setup.log" >&2; return 1; }; }
+# not the tracebacks of the programs that end with it; what runs in the background ignores it
+trap 'kill $(jobs -p) 2> /dev/null || :; exit 130' INT
+failed() { tail -n 20 "$1" >&2; return 1; }
+logged() { "$@" > "$ros/setup.log" 2>&1 || failed "$ros/setup.log"; }
 environment() {
   mkdir -p "$ros"
   logged "${PYTHON:-python3}" -m venv "$@" "$ros"
 }
 # Python compiles what is imported at the first import: a small part, in half of pip's time
-pip() { logged "$ros/bin/python" -m pip install --disable-pip-version-check --no-compile "$@"; }
+install=("$ros/bin/python" -m pip install --disable-pip-version-check --no-compile)
+pip() { logged "${install[@]}" "$@"; }
 
 on_system() {
   environment --system-site-packages
@@ -26,8 +29,14 @@ on_system() {
 from_wheels() {
   environment
   # --no-deps: the list is complete without ros-wheels-bootstrapper, which starts every Python of
-  # the environment twice to set the variables of local_setup.sh.
-  pip --no-deps -r "$here/requirements.txt"
+  # the environment twice to set the variables of local_setup.sh. Two halves at a time, as pip loads
+  # and unpacks one wheel after another.
+  sed -n 'p;n' "$here/requirements.txt" > "$ros/odd.txt"
+  sed -n 'n;p' "$here/requirements.txt" > "$ros/even.txt"
+  "${install[@]}" --no-deps -r "$ros/odd.txt" > "$ros/setup_odd.log" 2>&1 &
+  local odd=$!
+  pip --no-deps -r "$ros/even.txt" || { kill "$odd" 2> /dev/null || :; return 1; }
+  wait "$odd" || failed "$ros/setup_odd.log"
   # The wheels' CMake files name their builder's Python; what is built here adds its own include
   # folders.
   sed -i -E 's#/opt/python/[^;"]*;?##g' "$ros"/share/*/cmake/*_pyExport.cmake
