@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hold or return: with an empty list, and when a replacement of the mission takes too long."""
+"""Hold, wait or return: with an empty list, and when a replacement of the mission takes too long."""
 from __future__ import annotations
 
 from collections import deque
@@ -69,7 +69,7 @@ class EndOfList:
             onboard.revision = tasks.revision
         flying = telemetry.mode is ModeFunction.MISSION and not onboard.progress.finished
         if flying and end and rest and all_alike(end[-len(rest):], rest):
-            self.going_home = True
+            self.going_home = tasks.returns
             return sender.satisfied()
         if self._just_landed(now):
             return []
@@ -90,6 +90,8 @@ class EndOfList:
         if tasks.end_via and tasks.returns and telemetry.mode is not ModeFunction.RETURN:
             self.going_home = True
             return None  # the straight path home crosses a zone: fly the list with the detour
+        if tasks.waits and self._policy().when_empty == 'hold':
+            return None  # fly to where it waits for tasks
         blocked = self._blocked_home() if returns else ''
         if blocked and telemetry.mode is not ModeFunction.RETURN:
             returns = False

@@ -140,7 +140,7 @@ class VehicleEnergy:
             for stop in tasks.stops:
                 points += [*stop.via, *stop.way]
                 hover += stop.task.service_time + stop.wait + speed / _STOP_ACCELERATION
-            points += tasks.end_via if tasks.returns else ()
+            points += tasks.tail
         home = telemetry.home or telemetry.position
         points.append(home)
         landing = max(0.0, points[-2][2] - home[2]) / _DESCENT

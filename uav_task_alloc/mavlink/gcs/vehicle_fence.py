@@ -319,7 +319,7 @@ class VehicleFence:
             return []
         tasks = onboard.remaining()
         points = [p for stop in tasks.stops for p in (*stop.via, *stop.way)]
-        return points + list(tasks.end_via if tasks.returns else ())
+        return points + list(tasks.tail)
 
     def _blocks(self) -> bool:
         """Whether the list passes where the fence on board forbids it, and is to be changed."""

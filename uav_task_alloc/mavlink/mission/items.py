@@ -45,7 +45,8 @@ def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin,
     Returns:
         Items without home; none where the list has no point. A return whose last point is above
         the home ends with NAV_LAND below that point, any other one with NAV_RETURN_TO_LAUNCH,
-        which climbs to the vehicle's own height.
+        which climbs to the vehicle's own height. A list without a task that does not return ends
+        with NAV_LOITER_UNLIM at its last point.
 
     Raises:
         MissionError: a service time does not fit into an item, or the autopilot cannot carry out
@@ -56,7 +57,9 @@ def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin,
     for stop in tasks.stops:
         placed += stop_items(stop, rules, before, cruise)
         before = stop
-    placed += (waypoint(point, rules, '') for point in tasks.end_via if tasks.returns)
+    placed += (waypoint(point, rules, '') for point in tasks.tail)
+    if tasks.waits:
+        placed[-1] = _wait_for_tasks(placed[-1], rules)
     if not placed:
         return ()
     items = located(placed, origin)
@@ -64,6 +67,13 @@ def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin,
         items.append(_landing(items[-1], rules) if lands_by_item(tasks, rules, home) else Item(
             dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=rules.command_frame))
     return tuple(items)
+
+
+def _wait_for_tasks(place: PlacedItem, rules: ItemRules) -> PlacedItem:
+    """The item with which it stays at a place, without an end, from the waypoint there."""
+    yaw = 0.0 if rules.loiters else rules.yaw
+    return place._replace(item=replace(
+        place.item, command=dialect.MAV_CMD_NAV_LOITER_UNLIM, params=(0.0, 0.0, 0.0, yaw)))
 
 
 def located(placed: Sequence[PlacedItem], origin: Origin) -> list[Item]:

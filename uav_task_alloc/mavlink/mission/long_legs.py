@@ -77,7 +77,7 @@ def with_points_between(tasks: TaskList, before: Sequence[Point] = ()) -> TaskLi
             way = filled if len(filled) > len(stop.way) else way
         stops.append(replace(stop, via=(*(() if stops else before), *path[:-1]), rest=way))
         last = stop.end
-    end = _filled(last, tasks.end_via) if tasks.returns else tasks.end_via
+    end = _filled(last, tasks.tail)
     if not stops and end:
         end = (*before, *end)
     return replace(tasks, stops=tuple(stops), end_via=end)
@@ -97,8 +97,7 @@ def _points(tasks: TaskList) -> Iterator[Point]:
     for stop in tasks.stops:
         yield from stop.via
         yield from stop.way
-    if tasks.returns:
-        yield from tasks.end_via
+    yield from tasks.tail
 
 
 def _filled(start: Point | None, path: Sequence[Point]) -> tuple[Point, ...]:

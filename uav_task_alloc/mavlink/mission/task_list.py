@@ -58,8 +58,18 @@ class TaskList:
     revision: int  # strictly increasing for a UAV; 0: none
     stops: tuple[MissionStop, ...] = ()  # in the order of flight
     returns: bool = False  # home after the last stop, else hold there
-    end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return
+    end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return, or to where it waits
     stamp: float = 0.0  # [s] ROS time of the plan
+
+    @property
+    def waits(self) -> bool:
+        """Whether it has no task, and leads to a place where the UAV waits for one."""
+        return bool(self.end_via) and not self.returns and not self.stops
+
+    @property
+    def tail(self) -> tuple[Point, ...]:
+        """The points flown after the last stop, ENU [m]."""
+        return self.end_via if self.returns or not self.stops else ()
 
     def without(self, tasks: Iterable[str]) -> TaskList:
         """Return the list without the tasks of these ids."""
