@@ -43,6 +43,12 @@ class AllocatorParams(FrameParams):
     objective_weights: tuple[float, ...] = param(
         (), 'Prices of distance, finish, response, lateness and tasks left out that replace '
         'those of the objective; .inf: never. Empty: by its name.')
+    anticipate: str = param(
+        'off', 'Where an idle UAV in flight waits: where it is; spread evenly; where tasks came '
+        'from. See docs/learning.md.', choices=('off', 'even', 'learnt'))
+    anticipate_area: tuple[float, ...] = param(
+        (), 'The area of work for that: west, south, east, north [m] ENU; empty: around the '
+        'tasks so far.')
     trips: int = param(1, 'Trips of a UAV that a plan counts on, with battery changes at its '
                        'home between them; 1: none.', low=1, high=64)
     clearance: float = param(10.0, 'Distance kept from zones beyond their margins.', low=0.0,
@@ -99,6 +105,11 @@ class AllocatorParams(FrameParams):
             raise InvalidValue('objective_weights', list(self.objective_weights),
                                'five numbers >= 0 (distance, finish, response, lateness, '
                                'unserved), or none')
+        area = self.anticipate_area
+        if area and not (len(area) == 4 and max(map(abs, area)) <= MAX_RANGE
+                         and area[0] < area[2] and area[1] < area[3]):
+            raise InvalidValue('anticipate_area', list(area),
+                               'west < east and south < north [m], or none')
         if self.altitude_min >= self.altitude_max:
             raise InvalidValue('altitude_min', self.altitude_min,
                                f'less than altitude_max = {self.altitude_max:g}')

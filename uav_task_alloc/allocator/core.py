@@ -18,6 +18,7 @@ from uav_task_alloc.allocator.records import (
     ReplanAnswer,
     ReplanProblem,
     SavedState,
+    UavList,
 )
 from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
@@ -34,6 +35,7 @@ from uav_task_alloc.allocator.replanning.proposal import Approvals, holding_plan
 from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.task_reasons import task_steps
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
+from uav_task_alloc.allocator.replanning.waiting_places import WaitingPlaces
 from uav_task_alloc.allocator.separation_watch import SeparationWatch
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.world import World
@@ -82,6 +84,7 @@ class Allocator:
         self.approvals = Approvals(self.world)
         self.separation = SeparationWatch(self.world)
         self.batteries = BatteryWatch(self.world)
+        self.waiting = WaitingPlaces(self.world)
         self._best = Plan({each.uav: each.task_ids for each in saved.lists}, reversed=frozenset(
             stop.task.id for each in saved.lists for stop in each.stops if stop.reversed))
         self._learned = saved.learned
@@ -124,9 +127,22 @@ class Allocator:
         if self._limiter.due(now):
             world.request_replan('deferred lists', now)
         world.forget_ended()
+        self._wait_for_tasks(now, stamp)
         self._predict(now, stamp)
         if world.outbox.statuses:
             self._step_tasks(stamp)
+
+    def _wait_for_tasks(self, now: float, stamp: float) -> None:
+        """Send idle UAVs to waiting places, not while a plan may give them tasks."""
+        world, lists = self.world, self.waiting.ended(now)
+        if not (self.schedule.busy or self.schedule.triggers):
+            lists = {**self.waiting.chosen(now, stamp), **lists}
+        published = world.publish(lists, stamp)
+        if published:
+            texts = self.waiting.texts()
+            for uav_id in published:
+                world.note(f'{uav_id} {texts.get(uav_id, "holds")}')
+            self._publish_allocation(world.lists_in_force().values(), 'waiting places', stamp)
 
     def _end_orders(self, stamp: float) -> None:
         """End the orders whose tasks have ended, and publish the holds that changed."""
@@ -292,12 +308,16 @@ class Allocator:
 
     def _predict(self, now: float, stamp: float) -> None:
         """Publish predicted times of the lists in force where they are news."""
-        world = self.world
         if self._predictions.tick(now, stamp):
-            plan = plan_in_force(world.lists, world.tasks, self._left_out, self._chosen)
-            world.outbox.allocation = Allocation(
-                world.next_revision(), tuple(self._predictions.lists(stamp).values()), plan,
-                'predicted arrivals', stamp)
+            self._publish_allocation(self._predictions.lists(stamp).values(),
+                                     'predicted arrivals', stamp)
+
+    def _publish_allocation(self, lists: Iterable[UavList], trigger: str, stamp: float) -> None:
+        """Publish the plan in force again, for which no list has got other tasks."""
+        world = self.world
+        plan = plan_in_force(world.lists, world.tasks, self._left_out, self._chosen)
+        world.outbox.allocation = Allocation(world.next_revision(), tuple(lists), plan, trigger,
+                                             stamp)
 
     def separate(self, now: float, stamp: float) -> MonitorStep:
         """Return holds that keep UAVs apart, and alerts; publish them before lists."""

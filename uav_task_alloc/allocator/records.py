@@ -232,7 +232,8 @@ class UavList:
     revision: int  # strictly increasing
     stops: tuple[ListStop, ...] = ()  # in the order of flight
     returns: bool = False  # returns home after the last task
-    end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return home
+    # [m] ENU, flown before the return home; of an empty list that holds to its waiting place
+    end_via: tuple[Point, ...] = ()
     distance: float = 0.0  # [m] of all legs and paths, with the leg home where it returns
     stamp: float = 0.0  # [s] of the plan
 
@@ -240,6 +241,11 @@ class UavList:
     def task_ids(self) -> tuple[str, ...]:
         """The task ids in the order flown."""
         return tuple(stop.task.id for stop in self.stops)
+
+    @property
+    def waiting_place(self) -> Point | None:
+        """Where the UAV waits for tasks [m] ENU; None: it has tasks, returns, or stays."""
+        return self.end_via[-1] if self.end_via and not (self.stops or self.returns) else None
 
     def same_route(self, other: UavList) -> bool:
         """Whether tasks, detour points, waits and end are equal: there is nothing to publish.
@@ -346,3 +352,5 @@ class SavedState:
     orders: OrderRows = field(default_factory=OrderRows)  # of operators
     works: list[WorkRecord] = field(default_factory=list)  # accepted, also ended ones
     proposal: Proposal | None = None  # that waits for approval
+    # announcements from which the demand is learnt: [s], [m] east, [m] north, value; by block
+    seen_tasks: dict[int, list[tuple[float, float, float, float]]] = field(default_factory=dict)

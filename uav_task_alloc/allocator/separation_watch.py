@@ -144,10 +144,23 @@ class SeparationWatch:
             return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
                                 f'{uav_id} is low on battery' if record.low else '', early=True)
         points = self._list_points(uav_id, stops, flight)
-        if not stops:
-            points = [(0.0, place)] if mode == 'HOLD' else _drift(record)
+        to_place = () if stops else self._way_to_place(uav_id, place)
+        if to_place:
+            lag = _lag(record, flight.pace)
+            points = [(0.0, place), *_along(place, to_place, lag, flight.pace)]
+        elif not stops:
+            waits = mode == 'HOLD' or self._world.list_of(uav_id).waiting_place is not None
+            points = [(0.0, place)] if waits else _drift(record)
         return MonitoredUav(self._way(record, points),
-                            (_FLIES, -stops[0].start if stops else -math.inf), bool(stops))
+                            (_FLIES, -stops[0].start if stops else -math.inf),
+                            bool(stops or to_place))
+
+    def _way_to_place(self, uav_id: str, place: Point) -> tuple[Point, ...]:
+        """The points ahead on the way to a waiting place; (): it is there, or has none."""
+        each = self._world.list_of(uav_id)
+        if each.waiting_place is None or math.dist(place, each.waiting_place) < _MOVES:
+            return ()
+        return each.end_via[points_passed(place, each.end_via):]
 
     def _way_home(self, uav_id: str, record: UavRecord, pace: FlightPace) -> _TimedPoints:
         """The points of its list on the way home that are ahead, else its own return."""

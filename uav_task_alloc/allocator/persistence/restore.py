@@ -19,6 +19,7 @@ from uav_task_alloc.allocator.records import (
     TaskState,
     UavList,
 )
+from uav_task_alloc.allocator.state.seen_tasks import restored_block
 from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point, check_ros_name
 from uav_task_alloc.errors import InvalidValue
@@ -33,7 +34,7 @@ from uav_task_alloc.zone_codec import JOURNAL_ZONE, decode_zone, encode_zone
 _Value = TypeVar('_Value')
 _ORDER_KINDS = frozenset({'order', 'order_log', 'hold'})
 _KINDS = frozenset({'task', 'work', 'list', 'zones', 'off', 'revision', 'learner', 'origin',
-                    'proposal', *_ORDER_KINDS})
+                    'proposal', 'demand', *_ORDER_KINDS})
 _UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
 _FIRST_FIELDS = frozenset({'id', 'position', 'value', 'service_time', 'required_capabilities',
                            'allowed_uavs', 'acceptance_radius'})  # every journal has them
@@ -129,6 +130,8 @@ def _restore(state: SavedState, row: JournalRow) -> None:
         state.proposal = None if row.body is None else _proposal(row.body)
     elif row.kind == 'learner':
         state.learned = row.body
+    elif row.kind == 'demand':
+        state.seen_tasks[int(row.id)] = restored_block(row.body)
     elif row.kind in _ORDER_KINDS:
         restore_order_row(state.orders, row)
     else:

@@ -38,6 +38,9 @@ def rows(world: World, state: object, most: int | None = None) -> list[JournalRo
                for task_id in sorted(unsaved['task'])[:most]]
     changed += [list_row(lists[uav_id]) if uav_id in lists else JournalRow('list', uav_id, None)
                 for uav_id in sorted(unsaved['list'])]
+    seen = world.announced.seen.blocks
+    changed += [JournalRow('demand', number, seen.get(number))
+                for number in sorted(unsaved['demand'])]
     make = {'zones': lambda: zones_row(world.zones.values()),
             'off': lambda: off_row(world.fleet.switched_off),
             'revision': lambda: revision_row(world.revision),
@@ -57,6 +60,7 @@ def mark_all(world: World) -> None:
     unsaved['task'].update(world.task_records())
     unsaved['list'].update(world.lists_in_force())
     unsaved['work'].update(world.works.records)
+    unsaved['demand'].update(world.announced.seen.blocks)
     mark_all_orders(world.orders)
     unsaved[''].update(('zones', 'off', 'revision', 'learner', 'proposal'))
 

@@ -29,6 +29,7 @@ _CHANGES = 20_000  # tried for each second of `solve_budget`, where the next pla
 _AHEAD = 2.0
 _DEAREST = 15.0  # [s] of flight that a return may cost; the monitor holds for about that time
 _LEAST = 1.0  # [s] of a wait; a shorter one is no change
+_AT_PLACE = 2.0  # [m] it is at its waiting place
 _LEAST_ERROR = 0.05  # share by which times may be off, however exact they were
 
 
@@ -45,7 +46,7 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
         The same lists where nothing is in conflict.
     """
     lists = {uav_id: _with_high_return(world, each) for uav_id, each in built.lists.items()}
-    flights = _flights(world, lists, stamp)
+    flights = planned_flights(world, lists, stamp)
     params, tried, most = world.params, count(), _MOST_CHANGES
     if params.background_budget > 0.0:
         most = min(most, round(_CHANGES * params.solve_budget))
@@ -92,8 +93,18 @@ def _with_high_return(world: World, each: UavList) -> UavList:
     return replace(each, end_via=(*each.end_via, above))
 
 
-def _flights(world: World, lists: Mapping[str, UavList], stamp: float) -> dict[str, Flight]:
-    """What each known UAV flies by its list."""
+def planned_flights(world: World, lists: Mapping[str, UavList],
+                    stamp: float) -> dict[str, Flight]:
+    """Return what each known UAV flies by its list.
+
+    Args:
+        world: as it is now; separation is on.
+        lists: by UAV.
+        stamp: [s] published clock.
+
+    Returns:
+        By UAV; up to about twice the horizon of the rule where plans follow each other.
+    """
     flights, rule = {}, separation_of(world.params)
     until = _AHEAD * rule.horizon if world.params.background_budget > 0.0 else math.inf
     for uav_id, each in lists.items():
@@ -139,7 +150,18 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         legs.append(FlightLeg((place, *each.end_via, flight.home), lands=True,
                               top=flight.takeoff_top if climbs else -math.inf,
                               movable=bool(each.stops), may_wait=False))
+    legs += _leg_to_wait(each, flight)
     return replace(own, legs=tuple(legs))
+
+
+def _leg_to_wait(each: UavList, flight: UavFlight) -> list[FlightLeg]:
+    """The leg to a waiting place, where the UAV stays."""
+    place, line = flight.position, each.end_via
+    if each.waiting_place is None or flight.on_ground or (
+            math.dist(place, each.waiting_place) < _AT_PLACE):
+        return []
+    ahead = line[points_passed(place, line):]
+    return [FlightLeg((place, *ahead), movable=False, may_wait=False)]
 
 
 def _same_leg(published: UavList, stop: ListStop) -> bool:

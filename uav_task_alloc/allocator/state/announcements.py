@@ -16,6 +16,7 @@ from uav_task_alloc.allocator.state.callbacks import Note, RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
 from uav_task_alloc.allocator.state.ground import Ground
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
+from uav_task_alloc.allocator.state.seen_tasks import SeenTasks
 from uav_task_alloc.allocator.state.tasks import TaskRegistry, verdict_texts
 from uav_task_alloc.allocator.state.works import Works
 from uav_task_alloc.errors import InvalidValue, first_of
@@ -27,13 +28,15 @@ from uav_task_alloc.work.pieces import Work
 class Announcements:
     """Applies announcements; each id is that of a point or of other work, never of both.
 
-    `recut_why`: why all open work is to be cut again; '' for not.
+    `recut_why`: why all open work is to be cut again; '' for not. `seen`: where new tasks were
+    announced.
 
     Args:
         tasks, works, deadlines: the present state.
         ground: below the tasks.
         note, request_replan: of the world.
         recut_why: at the start.
+        seen: announcements of the previous run.
 
     Arguments of methods:
         action: ADD or UPDATE.
@@ -44,11 +47,12 @@ class Announcements:
     """
 
     def __init__(self, tasks: TaskRegistry, works: Works, deadlines: Deadlines, ground: Ground,
-                 note: Note, request_replan: RequestReplan, recut_why: str = '') -> None:
+                 note: Note, request_replan: RequestReplan, recut_why: str = '',
+                 seen: SeenTasks | None = None) -> None:
         self._tasks, self._works, self._deadlines = tasks, works, deadlines
         self._ground = ground
         self._note, self._request_replan = note, request_replan
-        self.recut_why = recut_why
+        self.recut_why, self.seen = recut_why, seen or SeenTasks()
 
     def apply(self, action: AnnouncementAction, items: Iterable[Task | Work], stamp: float,
               now: float) -> list[TaskVerdict]:
@@ -68,6 +72,8 @@ class Announcements:
             else:
                 verdicts.append(self._deadlines.refused(item, stamp) or (
                     self._tasks.add if add else self._tasks.update)(item, stamp))
+            if add and verdicts[-1].accepted and not verdicts[-1].unchanged:
+                self.seen.add(item, stamp)
         return self._logged(action, verdicts, now)
 
     def cancel(self, task_ids: Iterable[str], stamp: float, now: float) -> list[TaskVerdict]:

@@ -53,7 +53,7 @@ class PublishedLists:
         published = self.get(new.uav)
         if not resend and (new is published or new.same_route(published)):
             return None
-        if not new.stops and published.revision == 0 and not resend:
+        if not (new.stops or new.end_via) and published.revision == 0 and not resend:
             return None
         revised = replace(new, revision=(published.revision or self._revision_floor) + 1,
                           stamp=stamp)

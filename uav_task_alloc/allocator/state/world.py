@@ -35,6 +35,7 @@ from uav_task_alloc.allocator.state.ordered_tasks import OrderedTasks
 from uav_task_alloc.allocator.state.orders import Orders
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths, SafePaths
+from uav_task_alloc.allocator.state.seen_tasks import SeenTasks
 from uav_task_alloc.allocator.state.task_events import TaskEvents
 from uav_task_alloc.allocator.state.task_state_machine import TaskStep
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
@@ -73,22 +74,20 @@ class World:
         stamp: [s] clock of the node.
         reason, trigger, text: for the log.
         available: what an operator sets.
-        warning: its level in the log; otherwise information.
+        warning, debug: its level in the log; otherwise information.
         kind: of a journal row.
         resend: publish unchanged lists, too.
         returns: whether the list should end with a return home.
         backward: ids of the tasks whose paths are flown from the last point.
-        debug: at the level debug.
     """
 
     def __init__(self, params: AllocatorParams, saved: SavedState,
                  make_safe_paths: MakeSafePaths, on_change: RequestReplan,
                  terrain: Terrain | None = None) -> None:
         self.params, self._make_safe_paths, self._on_change = params, make_safe_paths, on_change
-        self.version = 0
         # of the allocation; and the first one with the lists in force
         self.revision = self.plan_revision = saved.revision
-        self.outbox = Outbox()
+        self.version, self.outbox = 0, Outbox()
         self.zones = {zone.id: zone for zone in saved.zones}
         self.restart_hold = any(each.stops for each in saved.lists)  # no task changes its UAV
         self.kernels_ready = False  # compiled: checks of zones are fast
@@ -114,9 +113,10 @@ class World:
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
         self.ground = Ground(terrain, lambda: tuple(self.zones.values()), lambda: self.params)
         self.works = Works(self.tasks, saved.works, self.ground.cut, self.deadlines.refusal)
+        seen = SeenTasks(saved.seen_tasks.items(), lambda: self.params.anticipate != 'off')
         self.announced = Announcements(
             self.tasks, self.works, self.deadlines, self.ground, self.note, self.request_replan,
-            'restart' if saved.works else '')
+            'restart' if saved.works else '', seen)
         self._events = TaskEvents(self.tasks, self.fleet, self.lists, self.request_replan,
                                   self._resend.add, self.note)
         self._missed = MissedCompletions(saved.lists, self.tasks, self.note)
@@ -367,10 +367,7 @@ class World:
         return {uav_id: each for uav_id, each in shorter.items() if each is not None}
 
     def lists_to_resend(self, stamp: float) -> dict[str, UavList]:
-        """Return the lists in force that are to be published again.
-
-        One with an ended task after the first waits for the plan: its legs are not valid.
-        """
+        """Return the lists to publish again; one with a later ended task waits for a plan."""
         return {uav_id: self.lists.restamped(uav_id, stamp, self.flights.of(uav_id, stamp))
                 for uav_id in sorted(self._resend)
                 if not any(map(self._ended, self.lists.get(uav_id).task_ids))}
@@ -392,4 +389,4 @@ class World:
         """Return what is not on disk: ids of 'task' and 'list' rows, kinds of the rows of ''."""
         return {'task': self.tasks.unsaved, 'work': self.works.unsaved,
                 'list': self.lists.unsaved, '': self._unsaved,
-                **self.orders.unsaved}
+                'demand': self.announced.seen.unsaved, **self.orders.unsaved}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hold, wait or return: with an empty list, and when a replacement of the mission takes too long."""
+"""Hold, wait or return: with an empty list; and when an upload of a mission takes too long."""
 from __future__ import annotations
 
 from collections import deque

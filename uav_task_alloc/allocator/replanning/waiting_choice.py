@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The joint choice of waiting places: the fleet as arrays, and what is chosen as places.
+
+Importing this module loads the compiled kernels.
+"""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_task_alloc.allocator.replanning.demand_area import LearntDemand
+from uav_task_alloc.allocator.state.safe_paths import SafePaths
+from uav_task_alloc.anticipation.intensity import Cells
+from uav_task_alloc.anticipation.places import MOVE_PRICES, ROUNDS, Waiting, choose_places
+from uav_task_alloc.model import Point
+
+_MOST_IDLE = 12  # UAVs that may move in one choice: a callback ends
+_NEAR = 1.0  # [m] the same place
+
+
+class WaitingChoice:
+    """Chooses places by the demand learnt so far."""
+
+    def __init__(self) -> None:
+        self.demand = LearntDemand()
+        self._turn = 0  # of the idle UAVs, where there are many
+        self._free: tuple[object, NDArray[np.float64]] | None = None  # cells outside zones
+
+    def places(self, learnt: bool, idle: Mapping[str, tuple[float, float, float]],
+               others: Sequence[tuple[float, Point, float]],
+               present: Mapping[str, tuple[Point, Point]], paths: SafePaths,
+               stamp: float) -> dict[str, Point]:
+        """Return the places [m] ENU of the UAVs that are to move.
+
+        Args:
+            learnt: by what was announced, else evenly.
+            idle: height [m], way that the battery allows [m] and speed [m/s], by id.
+            others: when [s] each other UAV is free, where, and its speed [m/s].
+            present: position, and present place [m] ENU of the idle UAVs, by id.
+            paths: around the zones.
+            stamp: [s] published clock.
+
+        Returns:
+            By id; empty while no area is known.
+        """
+        demand = self.demand.demand
+        if demand is None or not idle:
+            return {}
+        ids = list(idle)
+        movable = {ids[(self._turn + k) % len(ids)] for k in range(min(_MOST_IDLE, len(ids)))}
+        self._turn = (self._turn + _MOST_IDLE) % len(ids) if len(ids) > _MOST_IDLE else 0
+        waiting = _arrays(idle, movable, others, present)
+        before = waiting.place.copy()
+        height = float(np.median([each[0] for each in idle.values()]))
+        cells = self._outside_zones(demand.cells, paths, height)
+        choose_places(cells, self.demand.distance, self.demand.weight(learnt, stamp), waiting,
+                      MOVE_PRICES, ROUNDS, np.zeros((4, cells.x.size)))
+        moved = np.hypot(*(waiting.place - before).T) > _NEAR
+        return {uav_id: (float(waiting.place[k, 0]), float(waiting.place[k, 1]), idle[uav_id][0])
+                for k, uav_id in enumerate(ids) if moved[k]}
+
+    def _outside_zones(self, cells: Cells, paths: SafePaths, height: float) -> Cells:
+        """The cells, without those whose centres are inside a zone."""
+        key = paths, round(height), self.demand.area
+        if self._free is None or self._free[0] != key:
+            free = np.array([0.0 if paths.around((float(x), float(y), height), wide=True) else 1.0
+                             for x, y in zip(cells.x, cells.y, strict=True)])
+            self._free = key, free
+        return cells._replace(inside=cells.inside * self._free[1])
+
+
+def _arrays(idle: Mapping[str, tuple[float, float, float]], movable: set[str],
+            others: Sequence[tuple[float, Point, float]],
+            present: Mapping[str, tuple[Point, Point]]) -> Waiting:
+    """The fleet as arrays, idle UAVs first; one that may not move now is free at its place."""
+    rows, places = [], []
+    for uav_id, (_, reach, speed) in idle.items():
+        position, place = present[uav_id]
+        x, y = (position if uav_id in movable else place)[:2]
+        rows.append((float(uav_id in movable), 0.0, x, y, speed, reach))
+        places.append(place[:2])
+    for free_in, (x, y, _), speed in others:
+        rows.append((0.0, free_in, x, y, speed, 0.0))
+        places.append((x, y))
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    m = len(rows)
+    return Waiting(*columns, np.array(places), np.zeros(m, np.int64), np.zeros(m))

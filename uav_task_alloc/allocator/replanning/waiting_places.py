@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Idle UAVs in flight are sent to places where tasks are expected; in doubt they stay.
+
+Lists without tasks lead there, see `UavList.waiting_place`.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from uav_task_alloc.allocator.order_records import OrderKind
+from uav_task_alloc.allocator.records import UavList
+from uav_task_alloc.allocator.replanning.from_now import separation_of
+from uav_task_alloc.allocator.state.fleet import UavRecord
+from uav_task_alloc.allocator.state.flight_pace import finish_time
+from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.geometry.polyline import polyline_length
+from uav_task_alloc.model import Leg, Point
+from uav_task_alloc.params import BridgeParams
+
+if TYPE_CHECKING:
+    from uav_task_alloc.allocator.replanning.waiting_choice import WaitingChoice
+
+_CHECK = 1.0  # [s] between two checks of the places in force
+_REVIEW, _LEAST_REVIEW = 30.0, 5.0  # [s] between two choices without an event, and with one
+_FLYING = ('HOLD', 'ON_MISSION')  # modes of a UAV that may be sent to a place
+_SHARE = 0.75  # of what a battery has above the reserve that the way there and home may take
+_CLIMB = 1.0  # [m] more than that is a climb of its own
+
+
+class WaitingPlaces:
+    """Chooses where idle UAVs wait, and ends that where it is not safe or not wanted any more.
+
+    Args:
+        world: of the allocator.
+
+    Arguments of methods:
+        now: [s] steady clock.
+        stamp: [s] published clock.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._checked = self._chosen_at = -math.inf  # [s] steady clock
+        self._event: object = None  # what the last choice was made for
+        self._choice: WaitingChoice | None = None  # imported once it is wanted: it loads kernels
+        self._stays: dict[str, str] = {}  # why a UAV was not sent, by id
+
+    @property
+    def on(self) -> bool:
+        """Whether idle UAVs are sent to places; never without an operator who approves plans."""
+        params = self._world.params
+        return params.anticipate != 'off' and params.approval == 'none'
+
+    def texts(self) -> dict[str, str]:
+        """Return where UAVs wait for tasks, and why others were not sent, by id."""
+        found = dict(self._stays) if self.on else {}
+        for uav_id, each in sorted(self._world.lists_in_force().items()):
+            if each.waiting_place is not None:
+                x, y, z = each.waiting_place
+                found[uav_id] = f'waits at ({x:.0f}, {y:.0f}, {z:.0f}) m for demand'
+        return found
+
+    def ended(self, now: float) -> dict[str, UavList]:
+        """Return empty lists for UAVs that are not to fly to their places any more."""
+        world = self._world
+        waiting = [each for each in world.lists_in_force().values()
+                   if each.waiting_place is not None]
+        if not waiting or (now - self._checked < _CHECK and self.on):
+            return {}
+        self._checked, ended = now, {}
+        for each in waiting:
+            why = self._why_ended(each)
+            if why:
+                world.note(f'{each.uav} stays where it is: {why}')
+                ended[each.uav] = replace(each, end_via=())
+        return ended
+
+    def _why_ended(self, each: UavList) -> str:
+        record = self._world.uav_record(each.uav)
+        if not self.on:
+            return 'no waiting places are wanted'
+        if record is None or not self._world.kernels_ready:
+            return ''  # after a restart: it has not reported yet
+        why = self._why_not_idle(each.uav, record)
+        if why or each.waiting_place is None:
+            return why
+        rest = self._world.paths().rest(record.report.position, Leg(each.end_via[:-1], 0.0),
+                                        each.waiting_place)
+        return 'a zone is on its way' if rest is None else ''
+
+    def _why_not_idle(self, uav_id: str, record: UavRecord) -> str:
+        """Why a UAV may not be sent to a place; '': it may."""
+        world, report = self._world, record.report
+        if not world.usable(uav_id):
+            return world.fleet.why_unusable(uav_id)
+        if report.authority != 'HELD' or report.foreign:
+            return f'authority {report.authority or "unknown"}'
+        if report.standby or report.mode not in _FLYING:
+            return f'mode {report.mode or "unknown"}'
+        if record.inside_zone or uav_id in world.zone_checks.stranded:
+            return 'a zone'
+        hold = world.orders.holds.get(uav_id)
+        if (hold is not None and hold.hold) or any(
+                order.uav == uav_id and order.kind is not OrderKind.FORBID
+                for order in world.orders.in_force.values()):
+            return 'an order'
+        each = world.list_of(uav_id)
+        return 'it has tasks' if each.stops or each.returns or report.active_task else ''
+
+    def chosen(self, now: float, stamp: float) -> dict[str, UavList]:
+        """Return lists of idle UAVs with other places, where it is time to choose."""
+        world = self._world
+        if not self.on or world.restart_hold or not world.kernels_ready:
+            return {}
+        idle = [uav_id for uav_id, record in sorted(world.uav_records().items())
+                if not self._why_not_idle(uav_id, record)]
+        event = (tuple(idle), world.announced.seen.version, world.plan_revision, world.paths(),
+                 world.params.anticipate)
+        past = now - self._chosen_at
+        if past < (_LEAST_REVIEW if event != self._event else _REVIEW):
+            return {}
+        self._chosen_at, self._event = now, event
+        self._stays = {uav_id: text for uav_id, text in self._stays.items() if uav_id in idle}
+        if not idle:
+            return {}
+        if self._choice is None:
+            from uav_task_alloc.allocator.replanning.waiting_choice import WaitingChoice
+            self._choice = WaitingChoice()
+        return self._sent(idle, self._choice, stamp)
+
+    def _sent(self, idle: list[str], choice: WaitingChoice, stamp: float) -> dict[str, UavList]:
+        """The lists of the UAVs that change their places."""
+        world, lists = self._world, dict[str, UavList]()
+        choice.demand.follow(world.announced.seen, world.params)
+        places = choice.places(world.params.anticipate == 'learnt', {
+            uav_id: (self._height(uav_id), *self._reach(uav_id)) for uav_id in idle},
+            self._others(idle, stamp), self._present(idle), world.paths(), stamp)
+        for uav_id, place in places.items():
+            each = self._list_to(uav_id, place)
+            why = (self._why_not(each) if each is not None else 'no safe way') or (
+                self._conflict(each, lists, stamp) if each is not None else '')
+            self._stays.pop(uav_id, None)
+            if why or each is None:
+                self._stays[uav_id] = f'stays where it is: {why}'
+            else:
+                lists[uav_id] = each
+        return lists
+
+    def _height(self, uav_id: str) -> float:
+        """The height [m] ENU at which a UAV flies to its place, and waits there.
+
+        That of its take-offs at least, at which it may fly anywhere; never down.
+        """
+        params, record = self._world.params, self._world.uav_records()[uav_id]
+        above = record.report.takeoff_height or BridgeParams.cruise_altitude
+        wanted = max(record.report.position[2], record.home[2] + above)
+        return min(max(wanted, params.altitude_min), params.altitude_max)
+
+    def _reach(self, uav_id: str) -> tuple[float, float]:
+        """The metres of way that a battery allows, and the speed [m/s]."""
+        uav = self._world.uav(uav_id)
+        seconds = self._world.flights.spendable(uav, self._height(uav_id)).endurance
+        return _SHARE * min(uav.range, seconds * uav.cruise_speed), uav.cruise_speed
+
+    def _present(self, idle: list[str]) -> dict[str, tuple[Point, Point]]:
+        """Where each idle UAV is, and where it waits or is sent to."""
+        found = {}
+        for uav_id in idle:
+            position = self._world.uav_records()[uav_id].report.position
+            found[uav_id] = position, self._world.list_of(uav_id).waiting_place or position
+        return found
+
+    def _others(self, idle: list[str], stamp: float) -> list[tuple[float, Point, float]]:
+        """When [s] other usable UAVs are free, where, and their speeds [m/s]."""
+        world, found = self._world, list[tuple[float, Point, float]]()
+        for uav_id, record in sorted(world.uav_records().items()):
+            flight = world.flights.of(uav_id, stamp)
+            if uav_id in idle or flight is None or not world.usable(uav_id):
+                continue
+            each = world.lists.restamped(uav_id, stamp, flight)
+            end = each.stops[-1].exit if each.stops else record.report.position
+            found.append((finish_time(replace(each, returns=False), flight), end,
+                          world.uav(uav_id).cruise_speed))
+        return found
+
+    def _list_to(self, uav_id: str, place: Point) -> UavList | None:
+        """A list that leads a UAV to a place; None: no safe way was found."""
+        world = self._world
+        start = world.uav_records()[uav_id].report.position
+        up = (start[0], start[1], place[2])
+        climb = (up,) if abs(up[2] - start[2]) > _CLIMB else ()
+        begin = climb[0] if climb else start
+        leg = world.paths().leg(begin, place)
+        if leg is None or not world.paths().clear(start, *climb, *leg.via, place):
+            return None
+        return replace(world.list_of(uav_id), end_via=(*climb, *leg.via, place), distance=0.0)
+
+    def _why_not(self, each: UavList) -> str:
+        """Why the battery of a UAV does not allow a place; '': it does."""
+        world, record = self._world, self._world.uav_records()[each.uav]
+        place = each.end_via[-1]
+        home = world.paths().leg(place, record.home)
+        if home is None:
+            return 'no safe way home from its place'
+        way = polyline_length((record.report.position, *each.end_via))
+        metres, _ = self._reach(each.uav)
+        return '' if way + home.length <= metres else 'battery'
+
+    def _conflict(self, each: UavList, sent: dict[str, UavList], stamp: float) -> str:
+        """With which UAV the way to a place, and waiting there, is in conflict; '': none."""
+        rule = separation_of(self._world.params)
+        if not rule.on:
+            return ''
+        from uav_task_alloc.allocator.replanning.separated_lists import planned_flights
+        from uav_task_alloc.separation.conflicts import find_conflicts
+        from uav_task_alloc.separation.volumes import flight_volumes
+        known = {uav_id: self._world.list_of(uav_id) for uav_id in self._world.uav_records()}
+        lists = {**known, **sent, each.uav: each}
+        flights = list(planned_flights(self._world, lists, stamp).values())
+        for found in find_conflicts(flight_volumes(flights, rule), rule):
+            pair = [flights[k].uav for k in found.flights]
+            if each.uav in pair:
+                return f'separation from {next(u for u in pair if u != each.uav)}'
+        return ''
