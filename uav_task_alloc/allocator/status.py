@@ -14,7 +14,7 @@ from uav_task_alloc.allocator.state.zone_checks import blocked_text
 from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.piece_ids import split_piece
-from uav_task_alloc.record.message_records import BATTERY_RESERVE, ORDER, UAV_WARNING
+from uav_task_alloc.record.message_records import BATTERY_RESERVE, ORDER, UAV_WARNING, WAITING
 
 _MAX_NAMED = 20  # UAVs in a warning
 _MAX_ORDERS = 50  # in the diagnostics, the newest
@@ -167,7 +167,8 @@ def _zone_warnings(world: World) -> list[tuple[str, str]]:
 
 def health_values(world: World, solving: bool,
                   near: Mapping[str, str] | None = None,
-                  turns: Mapping[str, str] | None = None) -> dict[str, object]:
+                  turns: Mapping[str, str] | None = None,
+                  waiting: Mapping[str, str] | None = None) -> dict[str, object]:
     """Return numbers of UAVs, tasks and zones, and the revision in force, by name.
 
     Args:
@@ -175,6 +176,7 @@ def health_values(world: World, solving: bool,
         solving: a plan is being computed.
         near: UAVs that would lose separation, by id; None: none.
         turns: last moments to turn home, by id; None: none.
+        waiting: where idle UAVs wait, or why they stay, by id; None: none.
 
     Returns:
         Counts of UAVs, zones and of tasks by state; the revision of the allocation; what is wrong
@@ -190,6 +192,8 @@ def health_values(world: World, solving: bool,
     return {**{f'{UAV_WARNING}{uav_id}': text for uav_id, text in warnings.items()},
             **{f'{_TURN}{uav_id}': text
                for uav_id, text in list((turns or {}).items())[:_MAX_NAMED]},
+            **{f'{WAITING}{uav_id}': text
+               for uav_id, text in list((waiting or {}).items())[:_MAX_NAMED]},
             **{f'{ORDER}{order.id}': f'{order.text} ({order.operator})' for order in orders},
             'orders in force': len(world.orders.in_force),
             'UAVs known': len(world.uav_records()),

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from uav_task_alloc.allocator.core import Allocator
 from uav_task_alloc.allocator.records import AnnouncementAction, UavReport
+from uav_task_alloc.allocator.replanning.demand_area import load_waiting_kernels
 from uav_task_alloc.allocator.replanning.planning import replan_problem, solve_problem
 from uav_task_alloc.geometry.detour import find_detour
 from uav_task_alloc.geometry.distances import Distances
@@ -38,6 +39,7 @@ def compile_kernels(plan: Callable[..., Plan], params: AllocatorParams) -> int:
     load_kernels(zones=True)
     load_timed_kernels(zones=True)  # any task may have a deadline
     load_separation_kernels()  # its parameters may change at any time
+    load_waiting_kernels()  # so may `anticipate`
     params, before = replace(params, solve_budget=_BUDGET), Plan({})
     allocator = Allocator(params, now=0.0)
     allocator.set_kernels_ready()

@@ -74,8 +74,8 @@ class AllocatorNode(Node):
         (ThreatZoneArray), `task_events` (TaskEvent), `fleet_origin`, `/diagnostics`.
     Services:
         `~/submit_tasks` (SubmitTasks), `~/replan` (Trigger), `~/set_availability`
-        (SetAvailability); for orders of operators `~/pin_task`, `~/forbid_task`,
-        `~/order_tasks`, `~/pause_uav`, `~/resume_uav`, `~/return_uav`, `~/undo_order`,
+        (SetAvailability), `~/forget_demand` (Trigger); for orders of operators
+        `~/pin_task`, `~/forbid_task`, `~/order_tasks`, `~/pause_uav`, `~/resume_uav`, `~/return_uav`, `~/undo_order`,
         `~/approve_plan`.
     Parameters:
         AllocatorParams, see docs/parameters.md.
@@ -137,6 +137,7 @@ class AllocatorNode(Node):
             self.offered = [
                 self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit),
                 self.create_service(Trigger, '~/replan', self.on_replan),
+                self.create_service(Trigger, '~/forget_demand', self.on_forget_demand),
                 self.create_service(SetAvailability, '~/set_availability', self.on_availability),
                 *self.orders.offer()]
         if role is Role.PASSIVE and not self.passive:
@@ -207,6 +208,13 @@ class AllocatorNode(Node):
         """Plan again without a change."""
         self.world.request_replan('replan service', time.monotonic())
         response.success, response.message = True, 'a new plan follows on `allocation`'
+        return response
+
+    def on_forget_demand(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Forget where tasks were announced."""
+        count = self.world.announced.seen.forget()
+        self.save()
+        response.success, response.message = True, f'{count} announcements are forgotten'
         return response
 
     def on_availability(self, request: SetAvailability.Request,
@@ -338,7 +346,7 @@ class AllocatorNode(Node):
         self.diagnostics.publish(from_diagnostics([allocator_row(
             self.get_fully_qualified_name(), [stopped] if stopped else warnings,
             {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts(),
-                             self.core.batteries.texts(self.stamp())),
+                             self.core.batteries.texts(self.stamp()), self.core.waiting.texts()),
              **self.election.facts()},
             bool(stopped))], self.stamp()))
 

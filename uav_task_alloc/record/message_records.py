@@ -33,6 +33,7 @@ AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
 SEPARATION_ACTIONS = ('NONE', 'HOLD', 'RELEASE', 'UNRESOLVED')
 _COUNT = re.compile('[0-9]{1,18}')  # int() refuses some strings for which isdigit() is true
 UAV_WARNING = 'warning of '  # a key of an allocator begins so, and ends with the id of a UAV
+WAITING = 'waiting of '  # the same, of a UAV without tasks
 ORDER = 'order '  # a key of an allocator begins so, and ends with the id of an order
 BATTERY_RESERVE = 'battery reserve'  # key of an allocator: share, see its parameter
 NOTHING = 'nothing is needed'  # value of `given_back_by` while the bridge has authority
@@ -295,12 +296,14 @@ def uploads_record(msg: _Message) -> RecordBody:
     Returns:
         Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text] by
         hardware id, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
-        UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator; `orders`: of
+        UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator; `waiting`: where
+        idle UAVs wait, likewise; `orders`: of
         operators, texts by id, likewise; `battery_reserves`: shares by its name.
     """
     return {'kind': 'uploads', 'uploads': dict(_upload_counts(msg)), 'authority': dict(
         _authority(msg)), 'clock_rates': dict(_clock_rates(msg)), 'uav_warnings': dict(
-        _of_allocators(msg, UAV_WARNING)), 'orders': dict(
+        _of_allocators(msg, UAV_WARNING)), 'waiting': dict(
+        _of_allocators(msg, WAITING)), 'orders': dict(
         _of_allocators(msg, ORDER)), 'battery_reserves': dict(_battery_reserves(msg)), 'health': {
         status.hardware_id or status.name: [
             status.level if isinstance(status.level, int) else ord(status.level), status.message]

@@ -8,7 +8,7 @@ from allocation import AllocatorDriver
 from uav_task_alloc.allocator.core import make_safe_paths
 from uav_task_alloc.allocator.records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
-from uav_task_alloc.allocator.replanning.separated_lists import _flights
+from uav_task_alloc.allocator.replanning.separated_lists import planned_flights
 from uav_task_alloc.allocator.replanning.task_lists import build_task_list
 from uav_task_alloc.model import Leg, Task, Uav
 from uav_task_alloc.params import AllocatorParams
@@ -23,7 +23,7 @@ def conflicts(driver):
     world = driver.world
     rule = separation_of(driver.world.params)
     rule = rule if rule.on else replace(rule, horizontal=10.0)
-    flights = _flights(world, world.lists_in_force(), driver.now)
+    flights = planned_flights(world, world.lists_in_force(), driver.now)
     return find_conflicts(flight_volumes(flights.values(), rule), rule)
 
 
@@ -92,12 +92,12 @@ def test_a_take_off_that_has_begun_is_planned_up_to_its_end_with_tasks_and_witho
     driver.add(Task('ta', (90.0, 0.0, 40.0)))
     driver.settle(report=False)
     column = ((0.0, 0.0, 20.0), (0.0, 0.0, 60.0))
-    flight = _flights(driver.world, driver.world.lists_in_force(), driver.now)['a']
+    flight = planned_flights(driver.world, driver.world.lists_in_force(), driver.now)['a']
     assert flight.legs[0].flown()[:2] == column
     assert driver.lists['a'].stops[0].leg.via == ()
     driver.cancel('ta')
     driver.settle(report=False)
-    flight = _flights(driver.world, driver.world.lists_in_force(), driver.now)['a']
+    flight = planned_flights(driver.world, driver.world.lists_in_force(), driver.now)['a']
     assert [leg.lands for leg in flight.legs] == [True]
     assert flight.legs[0].flown()[:2] == column
 
@@ -112,7 +112,7 @@ def test_what_is_minutes_ahead_is_left_to_later_plans_and_stays_in_the_lists():
     lists, world = driver.lists, driver.world
     assert lists['a'].task_ids == ('ta', 'ta0', 'ta1', 'ta2')
     assert lists['b'].task_ids == ('tb', 'tb0', 'tb1', 'tb2')
-    flights = _flights(world, world.lists_in_force(), driver.now)
+    flights = planned_flights(world, world.lists_in_force(), driver.now)
     assert [len(each.legs) for each in flights.values()] == [2, 2]
     assert all(each.goes_on for each in flights.values())
     assert conflicts(driver) == []

@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.allocator.state.seen_tasks import SeenTask, SeenTasks
 from uav_task_alloc.anticipation.demand import Demand, Observation
+from uav_task_alloc.anticipation.places import MOVE_PRICES, ROUNDS, Waiting, choose_places
+from uav_task_alloc.kernel_cache import NOTICE, KernelWork
 from uav_task_alloc.params import AllocatorParams
 
 _Floats = NDArray[np.float64]
 _LEAST_SIDE = 400.0  # [m] of an area around tasks
 _STEPS = 8.0  # to which the corners are rounded outwards, of the side rounded up to a power of 2
+_WORK = KernelWork(3.0, 4)
 Area = tuple[float, float, float, float]  # west, south, east, north [m] ENU
 
 
@@ -99,14 +102,12 @@ class LearntDemand:
 @functools.cache
 def load_waiting_kernels() -> None:
     """Load the kernels, compile those not on disk yet; further calls do nothing."""
-    from uav_task_alloc.anticipation.places import MOVE_PRICES, ROUNDS, Waiting, choose_places
-    learnt = LearntDemand()
-    seen = SeenTasks([(0, [(0.0, 0.0, 0.0, 1.0)])])
-    learnt.follow(seen, AllocatorParams())
-    assert learnt.demand is not None
-    weight = learnt.weight(True, 0.0)
-    one = np.ones(1)
+    learnt, one = LearntDemand(), np.ones(1)
     waiting = Waiting(one, 0.0 * one, 0.0 * one, 0.0 * one, one, one, np.zeros((1, 2)),
                       np.zeros(1, np.int64), np.zeros(1))
-    choose_places(learnt.demand.cells, learnt.distance, weight, waiting, MOVE_PRICES, ROUNDS,
-                  np.zeros((4, weight.size)))
+    with NOTICE.until_loaded('waiting places', _WORK):
+        learnt.follow(SeenTasks([(0, [(0.0, 0.0, 0.0, 1.0)])]), AllocatorParams())
+        weight = learnt.weight(True, 0.0)
+        assert learnt.demand is not None
+        choose_places(learnt.demand.cells, learnt.distance, weight, waiting, MOVE_PRICES, ROUNDS,
+                      np.zeros((4, weight.size)))
