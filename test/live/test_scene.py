@@ -52,6 +52,15 @@ def test_arrivals_count_from_the_stamp_of_the_list():
         ('t1', BEGIN + 1.2), ('t2', BEGIN + 2.5)]
 
 
+def test_where_a_uav_waits_for_tasks_is_on_the_page():
+    way = [[10.04, 20.0, 50.0], [30.0, 40.0, 50.0]]
+    parts, _, _ = updates(FIRST, [{**listed(BEGIN + 1.0, 'u1', 2, []), 'waits': way}])
+    assert parts['list u1'] == {'revision': 2, 'tasks': [], 'waits': [
+        [10.0, 20.0, 50.0], [30.0, 40.0, 50.0]]}
+    parts, _, _ = updates(FIRST, [{**listed(BEGIN + 1.0, 'u1', 2, []), 'waits': []}])
+    assert 'waits' not in parts['list u1']
+
+
 def test_arrivals_follow_the_measured_clock_of_the_fleet():
     measured = {'wall': BEGIN + 1.0, 'kind': 'uploads', 'uploads': {}, 'clock_rates': {'u1': 8.0}}
     parts, _, _ = updates(FIRST, [measured])

@@ -95,6 +95,17 @@ def test_a_route_shows_its_order_its_arrows_its_detours_and_the_way_home():
     assert points(left, 'detour_points') == [(50, 20, 5)]
 
 
+def test_a_uav_that_waits_for_tasks_shows_where_and_its_way_there():
+    one = UavList('u1', 3, end_via=((50.0, 20.0, 5.0), (90.0, 0.0, 5.0)))
+    left = check_markers(markers(MarkerScene(AT, [one], uavs={'u1': uav('u1', 0.0, 0.0, 5.0)})))
+    assert points(left, 'routes') == [(0, 0, 5), (50, 20, 5), (90, 0, 5)]
+    assert texts(left, 'waiting_labels') == ['u1 waits here']
+    place = left['waiting_places', 0].pose.position
+    assert (place.x, place.y, place.z) == (90.0, 0.0, 5.0)
+    assert check_path(path_message(one, uav('u1', 0.0, 0.0, 5.0))) == [
+        (0.0, 0.0, 5.0), (50.0, 20.0, 5.0), (90.0, 0.0, 5.0)]
+
+
 def test_tasks_are_coloured_by_state_and_sized_by_value():
     left = check_markers(markers(MarkerScene(AT, tasks=[
         record('a', 1.0, 0.0, 0.0, value=10.0), record('b', 2.0, 0.0, 0.0, value=1.0),

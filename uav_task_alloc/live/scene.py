@@ -192,10 +192,14 @@ class Scene:
             [name, text] for each in self.run.orders.values() for name, text in each.items()]}
 
     def list(self, uav: str) -> LogEntry:
-        """The remaining tasks of a UAV; `at`: expected arrival [unix s]."""
+        """The remaining tasks of a UAV; `at`: expected arrival [unix s].
+
+        `waits`: points to where it waits for tasks.
+        """
         line, speedup = self.run.lists[uav], self.run.speedup
         planned_at = self.run.planned_at(line)
-        return {'revision': line['revision'], 'tasks': [
+        waits = [to_decimetres(point) for point in line.get('waits', ())]
+        return {'revision': line['revision'], **({'waits': waits} if waits else {}), 'tasks': [
             {'id': row['id'], 'via': [to_decimetres(point) for point in row['via']],
              'at': round(planned_at + row['eta'] / speedup, 1) if 'eta' in row else None,
              **({'way': [to_decimetres(point) for point in row['way']]} if 'way' in row else {}),

@@ -75,8 +75,8 @@ class AllocatorNode(Node):
     Services:
         `~/submit_tasks` (SubmitTasks), `~/replan` (Trigger), `~/set_availability`
         (SetAvailability), `~/forget_demand` (Trigger); for orders of operators
-        `~/pin_task`, `~/forbid_task`, `~/order_tasks`, `~/pause_uav`, `~/resume_uav`, `~/return_uav`, `~/undo_order`,
-        `~/approve_plan`.
+        `~/pin_task`, `~/forbid_task`, `~/order_tasks`, `~/pause_uav`, `~/resume_uav`,
+        `~/return_uav`, `~/undo_order`, `~/approve_plan`.
     Parameters:
         AllocatorParams, see docs/parameters.md.
     """

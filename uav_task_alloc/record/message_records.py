@@ -249,9 +249,12 @@ def task_list_record(msg: _Message) -> RecordBody:
         msg: TaskList.
 
     Returns:
-        Kind `list`; `stamp` [unix s], `eta`, `finish` [s] from `stamp`, `wait` [s], lengths in m.
+        Kind `list`; `stamp` [unix s], `eta`, `finish` [s] from `stamp`, `wait` [s], lengths in m;
+        `waits`: points [m] to where the UAV waits for tasks, none where it does not.
     """
+    waits = msg.end_via if not (msg.tasks or msg.end) else ()  # on the way to its waiting place
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
+            'waits': [xyz for xyz in map(_xyz, waits) if all(map(math.isfinite, xyz))],
             'stamp': from_stamp(msg.header.stamp),
             'distance': finite_or_none(msg.distance), 'tasks': [
                 {'id': piece_id(row.task.task_id, getattr(row, 'piece', 0)),

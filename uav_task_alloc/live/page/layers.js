@@ -139,6 +139,24 @@ export function drawRoutes(context, view, scene, colours) {
   context.globalAlpha = 1;
 }
 
+// Where UAVs without tasks wait for one: a thin line to a double circle, which is no task.
+export function drawWaits(context, view, waits, colours) {
+  for (const {index, points} of waits) {
+    const pixels = points.map(view.pixel), [x, y] = pixels.at(-1);
+    context.strokeStyle = uavColour(index, colours);
+    context.lineWidth = 1.5;
+    context.setLineDash([1, 5]);
+    line(context, pixels);
+    context.stroke();
+    context.setLineDash([]);
+    for (const radius of [5, 10]) {
+      context.beginPath();
+      context.arc(x, y, radius, 0, 2 * Math.PI);
+      context.stroke();
+    }
+  }
+}
+
 // Halfway from a to b; none where they are close.
 function arrow(context, a, b) {
   if (Math.hypot(b[0] - a[0], b[1] - a[1]) < 24) return;

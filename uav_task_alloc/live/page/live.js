@@ -47,9 +47,13 @@ function showMap(model, picked) {
     index: uav.index, points: [uav.position, ...model.lists.get(uav.id).flatMap(
       ({id, via, way}) => way && id === uav.active ? pointsAhead(uav.position, [...via, ...way])
         : [...via, ...way || [at(id)]])].filter(point => point && point[0] !== null)}));
+  const waits = model.uavs.filter(uav => model.waits.get(uav.id).length && !uav.lost).map(uav =>
+    ({index: uav.index, points: [...uav.position[0] === null ? [] : [uav.position],
+      ...pointsAhead(uav.position, model.waits.get(uav.id))]}));
   const works = [...model.works].map(([id, work]) => ({...work, position: at(id)}))
     .filter(work => work.position && work.position[0] !== null);
-  map.show({origin: model.origin, zones: model.zones, routes, tasks, works, uavs: model.uavs,
+  map.show({origin: model.origin, zones: model.zones, routes, waits, tasks, works,
+    uavs: model.uavs,
     changed: given.filter(id => at(id) && model.turns.has(id)).map(at),
     pickedId: picked, pickedIndex: model.turns.get(picked)?.index,
     picked: at(picked) ? [at(picked)] : [],

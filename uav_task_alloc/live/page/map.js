@@ -2,8 +2,8 @@
 // The map: a view of the ENU plane that is moved and zoomed; what is drawn, and what is clicked.
 import {degreesText, frameOf, metresText, roundStep} from './geo.js';
 import {listen} from './gestures.js';
-import {RINGS, drawGrid, drawRings, drawRoutes, drawTasks, drawWorks, drawZones, themeColours,
-  zoneOutline} from './layers.js';
+import {RINGS, drawGrid, drawRings, drawRoutes, drawTasks, drawWaits, drawWorks,
+  drawZones, themeColours, zoneOutline} from './layers.js';
 import {Overlay} from './overlay.js';
 import {Tiles} from './tiles.js';
 
@@ -144,6 +144,7 @@ export class FleetMap {
     drawZones(context, view, scene.zones, colours);
     drawWorks(context, view, scene.works, colours);
     drawRoutes(context, view, scene, colours);
+    drawWaits(context, view, scene.waits, colours);
     drawRings(context, view, scene.changed, RINGS.given, colours.mark);
     drawTasks(context, view, scene.tasks, colours);
     drawRings(context, view, scene.picked, RINGS.picked, colours.ink);

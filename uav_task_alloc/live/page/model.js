@@ -34,7 +34,7 @@ export function readModel(past) {
   const {parts} = past || live, wall = past ? past.wall : live.clock.wall;
   const map = name => new Map(Object.entries(parts[name] || {}));
   const model = {wall, where: map('tasks'), statuses: map('statuses'), zones: parts.zones || [],
-    lists: new Map(), turns: new Map(), times: map('times'), works: map('works'), origin: parts.origin || null,
+    lists: new Map(), waits: new Map(), turns: new Map(), times: map('times'), works: map('works'), origin: parts.origin || null,
     frame: parts.origin ? frameOf(parts.origin) : null, over: !past && Boolean(live.clock.ended)};
   const states = map('uavs'), authorities = map('authority');
   const lists = Object.keys(parts).filter(name => name.startsWith('list '));
@@ -43,6 +43,7 @@ export function readModel(past) {
   names.forEach((uav, index) => {
     const tasks = parts['list ' + uav]?.tasks || [];
     model.lists.set(uav, tasks);
+    model.waits.set(uav, parts['list ' + uav]?.waits || []);
     tasks.forEach(({id, at}, k) => {
       const turn = {uav, index, place: k + 1, at}, whole = id.replace(/#\d+$/, '');
       model.turns.set(id, turn);
@@ -54,6 +55,7 @@ export function readModel(past) {
   model.uavs = names.map((id, index) => {
     const uav = {id, index, ...describe(states.get(id), model),
       ...authorityOf(authorities.get(id), wall)};
+    if (model.waits.get(id)?.length && !uav.silent) uav.words += ', waits for tasks';
     uav.trouble = uav.lost || Boolean(uav.health) || uav.mode === 'FAULT' || uav.taken;
     return uav;
   });

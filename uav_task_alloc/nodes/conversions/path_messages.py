@@ -24,9 +24,12 @@ def remaining_path(uav_list: UavList, uav: UavRecord | None) -> list[Point]:
 
     Returns:
         [m] ENU: its position where that is known, detour points and tasks in order, and home
-        where the list returns.
+        where the list returns; or the way to its waiting place.
     """
     points: list[Point] = []
+    if uav is not None and uav_list.waiting_place is not None:
+        place, way = uav.report.position, uav_list.end_via
+        return [place, *way[points_passed(place, way):]]
     for k, stop in enumerate(uav_list.stops):
         leg = stop.line
         points += leg[points_passed(uav.report.position, leg):] if uav and k == 0 else leg

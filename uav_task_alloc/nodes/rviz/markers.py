@@ -94,6 +94,7 @@ def markers(scene: MarkerScene) -> MarkerArray:
     colours = {uav_id: _UAV_COLOURS[k % len(_UAV_COLOURS)] for k, uav_id in enumerate(
         sorted({*uavs, *(uav_list.uav for uav_list in lists)}))}
     for uav_list in lists:
+        _waiting_place(out, uav_list, colours[uav_list.uav])
         _route(out, uav_list, uavs.get(uav_list.uav), colours[uav_list.uav], stops)
     for uav_id, record in uavs.items():
         _uav(out, uav_id, record, colours[uav_id])
@@ -155,6 +156,15 @@ def _route(out: MarkerList, uav_list: UavList, uav: UavRecord | None, colour: _C
         _arrow(out, stop.leg.via[-1] if stop.leg.via else last, goal, colour)
         out.label('order', f'{order}: {stop.task.id}', goal, colour)
         last = stop.exit
+
+
+def _waiting_place(out: MarkerList, uav_list: UavList, colour: _Colour) -> None:
+    """A flat disk where a UAV without tasks waits for one."""
+    if uav_list.waiting_place is not None:
+        disk = out.add('waiting_places', Marker.CYLINDER, colour, 6.0, alpha=0.35,
+                       position=uav_list.waiting_place)
+        disk.scale.z = 0.2 * out.unit
+        out.label('waiting_labels', f'{uav_list.uav} waits here', uav_list.waiting_place, colour)
 
 
 def _arrow(out: MarkerList, start: Point | None, goal: Point, colour: _Colour) -> None:
