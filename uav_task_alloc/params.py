@@ -72,7 +72,8 @@ class AllocatorParams(FrameParams):
     list_interval: float = param(0.25, 'Minimum time between two lists for one UAV, unless it '
                                  'cannot fly the first.', low=0.0, high=3600.0, unit='s')
     locked_tasks: int = param(1, 'Tasks of a list that stay with a UAV in flight: the active '
-                              'one, and those after it.', low=0, high=1000)
+                              'one, and those after it; 0: it may be diverted until it has '
+                              'reached its task.', low=0, high=1000)
     battery_reserve: float = param(0.2, 'Battery that no plan uses: a UAV turns home while it '
                                    'lasts for the way home and this.', low=0.0, high=0.9)
     position_jump: float = param(200.0, 'Distance between two reports above which the jump is '

@@ -9,7 +9,7 @@ from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.allocator.status import health_warnings
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.zones import path_is_clear
-from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.model import Task, ThreatZone
 
 
 @pytest.fixture
@@ -295,3 +295,15 @@ def test_no_task_is_locked_with_locked_tasks_0():
     driver.settle()
     driver.event('STARTED', 't1', 'a')
     assert driver.world.locked_tasks() == {}
+
+
+def test_a_task_that_is_served_is_locked_with_locked_tasks_0_too():
+    driver = AllocatorDriver(locked_tasks=0)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(Task('t1', (100.0, 0.0, 50.0), service_time=60.0), ('t2', 200, 0))
+    driver.settle()
+    driver.event('STARTED', 't1', 'a')
+    driver.uav('a', 60.0, 0.0, 50.0, active_task='t1')
+    assert driver.world.locked_tasks() == {}
+    driver.uav('a', 100.0, 0.0, 50.0, active_task='t1')
+    assert driver.world.locked_tasks() == {'a': ('t1',)}

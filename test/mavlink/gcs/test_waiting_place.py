@@ -66,6 +66,21 @@ def test_a_task_is_flown_at_once(kind, arrived):
 
 
 @BOTH
+def test_a_vehicle_under_way_to_a_task_is_diverted_to_another_one(kind):
+    bench = FlightBench(kind).discover()
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.completed() == ['A'] and bench.started() == ['A', 'B'])
+    bench.run(limit=2.0)
+    bench.assign(task_list('C', 2))
+    assert bench.run(lambda: bench.completed() == ['A', 'C'], 60.0)
+    bench.run(limit=20.0)
+    assert 'B' not in bench.completed()
+    assert (100, 100, 50) not in bench.flown()
+    bench.assign(task_list('B', 3))
+    assert bench.run(lambda: bench.completed() == ['A', 'C', 'B'], 60.0)
+
+
+@BOTH
 def test_an_empty_list_on_the_way_lets_it_hold_where_it_is(kind):
     bench = idle(kind)
     bench.assign(waits(2))

@@ -193,6 +193,10 @@ class Flights:
                      self._errors, self._reported):
             kept.pop(uav_id, None)
 
+    def serving(self, uav_id: str) -> str:
+        """Return the task that a UAV has reached and not completed; '' for none."""
+        return self._reached.get(uav_id, ('', 0.0))[0]
+
     def of(self, uav_id: str, stamp: float) -> UavFlight | None:
         """Return the flight of a UAV; None where it has not reported."""
         record = self._fleet.records.get(uav_id)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which tasks a plan may not take from a UAV: the one it flies, and the next ones committed."""
+"""Which tasks a plan may not take from a UAV: that it serves or flies to, and the next ones."""
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from uav_task_alloc.allocator.state.fleet import Fleet
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
@@ -8,13 +10,16 @@ from uav_task_alloc.allocator.state.tasks import TaskRegistry
 
 
 def locked_tasks(tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists, committed: int,
-                 hold: bool) -> dict[str, tuple[str, ...]]:
+                 hold: bool, serving: Callable[[str], str] = lambda uav_id: '',
+                 ) -> dict[str, tuple[str, ...]]:
     """Return the locked tasks of each usable UAV that has any, in the order flown.
 
     Args:
         tasks, fleet, lists: the present state.
         committed: tasks of a UAV in flight that are locked, with the one it flies.
         hold: lock whole lists, also of UAVs that fly none of their tasks.
+        serving: the task that a UAV has reached and not completed, '' for none; it is locked
+            whatever `committed` is.
     """
     owners, locked = lists.owners(), dict[str, tuple[str, ...]]()
     seen: set[str] = set()
@@ -27,7 +32,8 @@ def locked_tasks(tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists, commi
             ids = (*filter(None, (active,)), *(t for t in listed if t != active))
         elif active and can_fly(tasks, fleet, uav_id, active):
             after = listed[listed.index(active) + 1:] if active in listed else ()
-            ids = (active, *(t for t in after if can_fly(tasks, fleet, uav_id, t)))[:committed]
+            most = max(committed, int(serving(uav_id) == active))
+            ids = (active, *(t for t in after if can_fly(tasks, fleet, uav_id, t)))[:most]
         else:
             ids = ()
         locked[uav_id] = tuple(t for t in ids if can_fly(tasks, fleet, uav_id, t))

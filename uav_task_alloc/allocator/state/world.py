@@ -306,7 +306,8 @@ class World:
         """Return the tasks of each UAV that a plan may not move, in the order flown."""
         return self.ordered.locked(
             locked_tasks(self.tasks, self.fleet, self.lists, self.params.locked_tasks,
-                         self.restart_hold), self.params.route_end == 'home')
+                         self.restart_hold, self.flights.serving),
+            self.params.route_end == 'home')
 
     def can_fly(self, uav_id: str, task_id: str) -> bool:
         """Return whether a task is open and a known UAV may fly it."""
