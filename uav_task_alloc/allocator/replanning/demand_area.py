@@ -75,8 +75,9 @@ class LearntDemand:
         if area != self.area or self.demand is None or len(rows) != self._count + len(new):
             self._begin(area)
             new = rows
-        for row in new if self.demand is not None else ():
-            self.demand.add(Observation(*row))
+        if self.demand is not None:
+            for row in new:
+                self.demand.add(Observation(*row))
         self._version, self._count = seen.version, len(rows)
 
     def _begin(self, area: Area | None) -> None:

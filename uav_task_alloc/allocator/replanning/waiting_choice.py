@@ -84,6 +84,7 @@ def _arrays(idle: Mapping[str, tuple[float, float, float]], movable: set[str],
     for free_in, (x, y, _), speed in others:
         rows.append((0.0, free_in, x, y, speed, 0.0))
         places.append((x, y))
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    m = len(rows)
-    return Waiting(*columns, np.array(places), np.zeros(m, np.int64), np.zeros(m))
+    movable_now, free_in, x, y, speed, reach = (np.array(column)
+                                                for column in zip(*rows, strict=True))
+    return Waiting(movable_now, free_in, x, y, speed, reach, np.array(places),
+                   np.zeros(len(rows), np.int64), np.zeros(len(rows)))
