@@ -26,6 +26,7 @@ _CHECK = 1.0  # [s] between two checks of the places in force
 _REVIEW, _LEAST_REVIEW = 30.0, 5.0  # [s] between two choices without an event, and with one
 _FLYING = ('HOLD', 'ON_MISSION')  # modes of a UAV that may be sent to a place
 _SHARE = 0.75  # of what a battery has above the reserve that the way there and home may take
+_UPRIGHT = 0.5  # [m] horizontally: straight down
 _CLIMB = 1.0  # [m] more than that is a climb of its own
 
 
@@ -64,14 +65,11 @@ class WaitingPlaces:
 
     def ended(self, now: float) -> dict[str, UavList]:
         """Return empty lists for UAVs that are not to fly to their places any more."""
-        world = self._world
-        waiting = [each for each in world.lists_in_force().values()
-                   if each.waiting_place is not None]
-        if not waiting or (now - self._checked < _CHECK and self.on):
+        if now - self._checked < _CHECK:
             return {}
-        self._checked, ended = now, {}
-        for each in waiting:
-            why = self._why_ended(each)
+        world, self._checked, ended = self._world, now, dict[str, UavList]()
+        for each in world.lists_in_force().values():
+            why = self._why_ended(each) if each.waiting_place is not None else ''
             if why:
                 world.note(f'{each.uav} stays where it is: {why}')
                 ended[each.uav] = replace(each, end_via=())
@@ -86,7 +84,7 @@ class WaitingPlaces:
         why = self._why_not_idle(each.uav, record)
         if why or each.waiting_place is None:
             return why
-        rest = self._world.paths().rest(record.report.position, Leg(each.end_via[:-1], 0.0),
+        rest = self._world.paths().rest_of_leg(record.report.position, Leg(each.end_via[:-1], 0.0),
                                         each.waiting_place)
         return 'a zone is on its way' if rest is None else ''
 
@@ -112,14 +110,14 @@ class WaitingPlaces:
     def chosen(self, now: float, stamp: float) -> dict[str, UavList]:
         """Return lists of idle UAVs with other places, where it is time to choose."""
         world = self._world
-        if not self.on or world.restart_hold or not world.kernels_ready:
+        past = now - self._chosen_at
+        if past < _LEAST_REVIEW or not self.on or world.restart_hold or not world.kernels_ready:
             return {}
         idle = [uav_id for uav_id, record in sorted(world.uav_records().items())
                 if not self._why_not_idle(uav_id, record)]
         event = (tuple(idle), world.announced.seen.version, world.plan_revision, world.paths(),
                  world.params.anticipate)
-        past = now - self._chosen_at
-        if past < (_LEAST_REVIEW if event != self._event else _REVIEW):
+        if past < _REVIEW and event == self._event:
             return {}
         self._chosen_at, self._event = now, event
         self._stays = {uav_id: text for uav_id, text in self._stays.items() if uav_id in idle}
@@ -193,9 +191,14 @@ class WaitingPlaces:
         climb = (up,) if abs(up[2] - start[2]) > _CLIMB else ()
         begin = climb[0] if climb else start
         leg = world.paths().leg(begin, place)
-        if leg is None or not world.paths().clear(start, *climb, *leg.via, place):
+        if leg is None:
             return None
-        return replace(world.list_of(uav_id), end_via=(*climb, *leg.via, place), distance=0.0)
+        via = leg.via
+        while via and math.dist(via[-1][:2], place[:2]) < _UPRIGHT and via[-1][2] > place[2]:
+            via, place = via[:-1], via[-1]  # no descent at the end: the ground may be there
+        if not world.paths().leg_clear(start, *climb, *via, place):
+            return None
+        return replace(world.list_of(uav_id), end_via=(*climb, *via, place), distance=0.0)
 
     def _why_not(self, each: UavList) -> str:
         """Why the battery of a UAV does not allow a place; '': it does."""
