@@ -126,6 +126,20 @@ def test_what_no_leg_reaches_over_the_ground_is_left_out_with_the_reason():
         'no safe path for a: 30 m above the ground a zone or altitude_max = 150 m is in the way')
 
 
+def test_a_uav_without_tasks_waits_above_the_ground():
+    driver = fleet(anticipate='even', anticipate_area=(-200.0, -1000.0, 400.0, -400.0),
+                   default_range=60_000.0)
+    driver.uav('a', -700.0, -700.0, 60.0, home=(-700.0, -700.0, 0.0), authority='HELD',
+               mode='HOLD')
+    driver.settle(10.0)
+    way = (-700.0, -700.0, 60.0), *driver.world.list_of('a').end_via
+    assert len(way) > 1
+    ground = ridge()
+    for a, b in pairwise(way):
+        assert a[:2] == b[:2] or ground.least_clearance(a, b)[0] >= 29.9, way
+    assert ground.above_ground([way[-1]])[0] >= 29.9
+
+
 def test_a_uav_that_stands_far_from_the_ground_is_named():
     driver = fleet()
     driver.uav('a', 0.0, 0.0, 0.0, standby=True)

@@ -84,7 +84,6 @@ def _arrays(idle: Mapping[str, tuple[float, float, float]], movable: set[str],
     for free_in, (x, y, _), speed in others:
         rows.append((0.0, free_in, x, y, speed, 0.0))
         places.append((x, y))
-    movable_now, free_in, x, y, speed, reach = (np.array(column)
-                                                for column in zip(*rows, strict=True))
-    return Waiting(movable_now, free_in, x, y, speed, reach, np.array(places),
-                   np.zeros(len(rows), np.int64), np.zeros(len(rows)))
+    columns = np.ascontiguousarray(np.array(rows, float).T)
+    return Waiting(columns[0], columns[1], columns[2], columns[3], columns[4], columns[5],
+                   np.array(places, float), np.zeros(len(rows), np.int64), np.zeros(len(rows)))
