@@ -46,7 +46,7 @@ class Observation(NamedTuple):
     at: float  # [s] since 1970, UTC, of the announcement
     x: float  # [m] east
     y: float  # [m] north
-    value: float
+    value: float  # of the task
 
 
 class Demand:

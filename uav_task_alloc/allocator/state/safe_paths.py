@@ -16,6 +16,7 @@ class SafePaths(Protocol):
         a: start [m] ENU.
         b: end [m] ENU.
         points: polyline [m] ENU.
+        point: [m] ENU.
         position: of the UAV [m] ENU.
         leg: that is being flown.
         goal: its end [m] ENU.

@@ -87,6 +87,9 @@ def restored_block(body: Any) -> list[SeenTask]:
     Args:
         body: of the row.
 
+    Returns:
+        [s], [m] east, [m] north and value of each.
+
     Raises:
         InvalidValue: it is no list of four numbers each.
     """
