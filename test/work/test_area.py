@@ -85,6 +85,21 @@ def test_a_field_that_zones_cover_mostly_is_covered_as_well():
     assert raster.share() >= 0.996
 
 
+def test_no_way_leads_into_a_notch_that_is_narrower_than_the_margins():
+    work = field([(-100.0, -100.0), (100.0, -100.0), (100.0, 100.0), (-100.0, 100.0)], 4.0,
+                 direction=math.pi / 2)
+    notched = [(-60.0, -40.0), (60.0, -40.0), (60.0, 40.0), (5.0, 40.0), (4.0, 0.0), (3.0, 30.0),
+               (0.0, 5.0), (-5.0, 40.0), (-60.0, 40.0)]
+    zone = ThreatZone.polygon('z', notched, 0.0, 100.0, 2.0)
+    assert all(path_is_clear(piece.path, [zone], 5.0) for piece in pieces_of(work, [zone], 5.0))
+
+
+@pytest.mark.parametrize('seed', [5813127, 5813191])
+def test_no_way_leads_into_a_notch_of_a_random_zone(seed):
+    work, zones = random_field(random.Random(seed))
+    assert all(path_is_clear(piece.path, zones, 5.0) for piece in pieces_of(work, zones, 5.0))
+
+
 def covered(outer, width):
     """Share of a field that its strips along x cover."""
     work = field(outer, width, direction=0.0)
