@@ -16,8 +16,6 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 
-from uav_task_alloc import plots
-from uav_task_alloc.cli import report
 from uav_task_alloc.cli.options import OptionParser
 from uav_task_alloc.cli.outputs import check_file
 from uav_task_alloc.errors import AllocError, InvalidValue
@@ -191,6 +189,8 @@ def received_signals() -> Iterator[list[int]]:
 
 def write_results(out: Path, duration: float) -> list[str]:
     """Write summary and map of a run of `duration` [s] into a folder; return its faults."""
+    from uav_task_alloc import plots  # imports matplotlib
+    from uav_task_alloc.cli import report  # imports numba
     summary = report.summarise(out)
     summary['wall_s'] = round(duration, 1)
     (out / run_folder.SUMMARY).write_text(json.dumps(summary, indent=2) + '\n')

@@ -9,7 +9,6 @@ from itertools import pairwise
 from pathlib import Path
 
 from uav_task_alloc.geometry.polyline import point_at, polyline_length
-from uav_task_alloc.geometry.zones import distance
 from uav_task_alloc.model import Point
 from uav_task_alloc.record.run_state import Line, RunState, ZoneInterval, read_lines, read_record
 
@@ -189,6 +188,7 @@ def zone_entries(truth: GroundTruth, zones: Sequence[ZoneInterval]) -> list[Zone
 
 
 def _entries(uav: str, track: Sequence[TrueSample], interval: ZoneInterval) -> Iterator[ZoneEntry]:
+    from uav_task_alloc.geometry.zones import distance  # imports numba
     was_outside = False  # at the point before, while the zone was in force
     for wall, point in resampled(track):
         if not interval.since <= wall < interval.until:
