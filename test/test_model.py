@@ -211,5 +211,11 @@ def test_an_action_has_all_keys_in_the_order_of_the_table():
 def test_waits_and_photos_take_their_time_at_the_task():
     actions = (Action('wait', {'seconds': 4.0}), Action('photo', {'count': 3, 'interval': 2.0}),
                Action('video'))
-    assert Task('t1', (0, 0, 0), service_time=1.0, actions=actions).stay == 9.0
+    assert Task('t1', (0, 0, 0), service_time=1.0, actions=actions[:2]).stay == 9.0
+    # a mission holds before the video is ended, and after it
+    assert Task('t1', (0, 0, 0), service_time=1.0, actions=actions).stay == 10.0
+    assert Task('t1', (0, 0, 0), service_time=5.0, actions=actions[2:]).stay == 10.0
+    assert Task('t1', (0, 0, 0), path=((0, 0, 0), (9, 0, 0)), service_time=1.0,
+                actions=actions).stay == 9.0
+    assert Task('t1', (0, 0, 0), actions=actions[2:]).stay == 2.0
     assert Task('t1', (0, 0, 0), service_time=1.0).stay == 1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,6 +11,8 @@ from uav_task_alloc.checks import FAR, check_number
 from uav_task_alloc.errors import InvalidValue
 
 _TURN = 2.0 * math.pi
+SETTLE = 1.0  # [s] that a mission holds at least at the end of a service with actions
+LASTING = frozenset({'video', 'trigger', 'roi', 'speed'})  # are ended at the end of a service
 
 
 class Bounds(NamedTuple):
@@ -119,6 +121,27 @@ def check_actions(place: str, actions: Iterable[Action]) -> tuple[Action, ...]:
         if not isinstance(each, Action):
             raise InvalidValue(place, each, 'an Action')
     return checked
+
+
+def stay_time(service_time: float, actions: Collection[Action], at_point: bool) -> float:
+    """Return how long a UAV stays for a service with actions, as missions carry them out.
+
+    At a point a mission holds for a second at least, in which commands are carried out, and holds
+    twice where an action has to be ended: before its end and after it. At the ends of a way it
+    brakes anyway, which takes as long as such a hold.
+
+    Args:
+        service_time: [s].
+        actions: of one task.
+        at_point: the task has no way.
+
+    Returns:
+        [s].
+    """
+    if not actions or not at_point:
+        return service_time + actions_time(actions)
+    holds = 1 + any(each.name in LASTING for each in actions)
+    return holds * max(service_time, SETTLE) + actions_time(actions)
 
 
 def actions_time(actions: Iterable[Action]) -> float:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
-from uav_task_alloc.actions import Action, actions_time, check_actions
+from uav_task_alloc.actions import Action, check_actions, stay_time
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polyline import polyline_length
@@ -129,7 +129,7 @@ class Task:
     @property
     def stay(self) -> float:
         """Service time, and what actions take where the UAV stays [s]; without the path."""
-        return self.service_time + actions_time(self.actions)
+        return stay_time(self.service_time, self.actions, not self.path)
 
 
 def turned_tasks(tasks: Iterable[Task], reversed: Collection[str]) -> list[Task]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ways flown by both simulated autopilots: once, from either end, without a gap, with pictures."""
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -193,3 +194,54 @@ def test_more_strips_than_the_vehicle_stores_are_flown_in_parts(kind):
     for each in strips:
         assert set(track.times_flown(each)) == {1}
     assert bench.failed() == []
+
+
+@BOTH
+def test_a_vehicle_that_reboots_in_mid_strip_flies_the_rest_after_a_hand_over(kind):
+    bench, track = surveying(kind, list_of(strip(0), strip(1), turned=('F#1',)))
+    halfway(bench, strip(0))
+    bench.vehicles[1].reboot(bench.now)  # it falls to the ground where it is
+    bench.run(limit=80.0)
+    assert bench.completed() == []
+    assert bench.vehicles[1].flight.body.position[2] < 1.0
+    bench.hand_over()
+    assert bench.run(lambda: len(bench.completed()) == 2, 500.0)
+    assert bench.completed() == ['F#0', 'F#1']
+    assert min(track.times_flown(strip(0))) >= 1
+    assert set(track.times_flown(strip(1))) == {1}
+    taken = pictures_of(bench, strip(0))
+    assert max(b - a for a, b in pairwise(taken)) <= 25.0
+    assert payload(bench)[-1] == ('trigger', '0')
+
+
+def clocked(bench):
+    """Let ROS time pass with the bench, from 1000 s on; returns it."""
+    bench.executor().policy = replace(bench.policy, clock=1000.0 + bench.now)
+    return 1000.0 + bench.now
+
+
+@BOTH
+@pytest.mark.parametrize('waiting', [0, 1])
+def test_a_wait_before_a_way_is_kept_and_the_way_flown_once(kind, waiting):
+    bench = FlightBench(kind).discover()
+    track, start, begun = Track(bench), clocked(bench), []
+    stops = list_of(strip(0), strip(1), turned=('F#1',)).stops
+    begins = [start + (63.0 if waiting == 0 else 40.0), start + (130.0 if waiting == 0 else 95.0)]
+    bench.assign(TaskList(1, tuple(
+        replace(stop, wait=40.0 * (k == waiting), begin=begins[k])
+        for k, stop in enumerate(stops)), stamp=start))
+    waited = strip(waiting)
+    entry = waited.path[-1 if waiting else 0]
+
+    def done():
+        clocked(bench)
+        off = math.dist(track.points[-1], entry)
+        if not begun and 20.0 < off < 40.0 and abs(track.points[-1][1] - entry[1]) < 3.0:
+            begun.append(1000.0 + bench.now - start)
+        return len(bench.completed()) == 2
+    assert bench.run(done, 500.0)
+    assert bench.completed() == ['F#0', 'F#1']
+    assert begun[0] == pytest.approx(begins[waiting] - start, abs=10.0)
+    for each in (strip(0), strip(1)):
+        assert set(track.times_flown(each)) == {1}
+        assert max(b - a for a, b in pairwise(pictures_of(bench, each))) <= 23.0

@@ -10,7 +10,7 @@ from itertools import count
 from uav_task_alloc.allocator.records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.planning import BuiltLists
-from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
+from uav_task_alloc.allocator.state.flight_pace import UavFlight, slower_along, timed_stops
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.model import Leg, Point
@@ -139,7 +139,8 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         legs.append(leg)
         clock = leg_times(own, leg, clock, k == 0).end
         if along:
-            legs.append(FlightLeg(stop.way, '', stop.task.stay,
+            stay = max(0.0, stop.task.stay + slower_along(stop, flight.pace))
+            legs.append(FlightLeg(stop.way, '', stay,
                                   movable=False, may_wait=False))
             clock = leg_times(own, legs[-1], clock, False).end
         place = stop.exit

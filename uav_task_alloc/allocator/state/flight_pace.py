@@ -262,7 +262,27 @@ def seconds_along(stop: ListStop, pace: FlightPace) -> float:
         return 0.0
     before = stop.leg.via[-1:]  # where it comes from matters for the corner only
     corner = pace.stop_time * pace.corners((*before, *stop.way[:2])) if before else 0.0
-    return pace.seconds(stop.way) + pace.stop_time * pace.corners(stop.way) + corner
+    own = _pace_along(stop, pace)
+    return own.seconds(stop.way) + own.stop_time * own.corners(stop.way) + corner
+
+
+def _pace_along(stop: ListStop, pace: FlightPace) -> FlightPace:
+    """The pace along the path of a task: an action sets the speed over ground."""
+    speed = next((each['speed'] for each in stop.task.actions if each.name == 'speed'), None)
+    return pace if speed is None else replace(pace, speed=speed, wind=(0.0, 0.0))
+
+
+def slower_along(stop: ListStop, pace: FlightPace) -> float:
+    """Return how much longer the path of a task takes than without its action `speed`.
+
+    Args:
+        stop: of a list.
+        pace: of its UAV.
+
+    Returns:
+        [s]; negative for an action that makes it faster.
+    """
+    return _pace_along(stop, pace).seconds(stop.way) - pace.seconds(stop.way)
 
 
 def way_ahead(place: Point, stop: ListStop) -> tuple[Point, ...] | None:
@@ -287,7 +307,8 @@ def _rest_of_path(stop: ListStop, flight: UavFlight) -> float:
     if not stop.task.path:
         return 0.0
     rest = stop.way[points_passed(flight.position, stop.way, stop.entry):]
-    return flight.pace.from_stop((flight.position, *rest), flight.share(rest[0]))
+    return _pace_along(stop, flight.pace).from_stop((flight.position, *rest),
+                                                    flight.share(rest[0]))
 
 
 def _earliest_departure(stops: Sequence[ListStop], flight: UavFlight) -> float:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from uav_task_alloc.actions import Action
+from uav_task_alloc.actions import SETTLE, Action
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.mavlink.action_commands import ActionCommand, ActionRow, compass, hold_of
 from uav_task_alloc.mavlink.autopilots import ItemRules
@@ -28,7 +28,6 @@ from uav_task_alloc.model import Point, Task
 _LONGEST_HOLD = 65535.0  # [s] ArduPilot keeps 16 bits
 _CLOSE = 2.0  # [m] that a vehicle flies within two cycles of its mission
 _SAME = 0.05  # [m] two points that an autopilot may store alike
-_SETTLE = 1.0  # [s] at the end of a service with actions
 
 
 class PlacedItem(NamedTuple):
@@ -142,13 +141,13 @@ class _Service:
             yield self._point(point, along=True)
         if ends and len(way) == 1:
             yield from self._turned(turn)
-            yield self._point(way[0], max(hold, _SETTLE), along=True)
+            yield self._point(way[0], max(hold, SETTLE), along=True)
         for end in ends:
             yield self._command(end)
         yield from self._turned(turn)
         stays = bool(ends) or len(way) == 1 or any(
             math.dist(point, way[-1]) < _SAME for point in way[:-1])
-        yield self._last(max(hold, _SETTLE) if stays else hold)
+        yield self._last(max(hold, SETTLE) if stays else hold)
 
     def _begin(self) -> Iterator[PlacedItem]:
         """The actions where the service begins."""
@@ -163,12 +162,12 @@ class _Service:
                 yield self._point(self._way[0], self._unlike_last(seconds))
         near = len(self._way) > 1 and math.dist(self._way[0], self._way[1]) < _CLOSE
         if open_commands > 1 and near:
-            yield self._point(self._way[0], self._unlike_last(_SETTLE))
+            yield self._point(self._way[0], self._unlike_last(SETTLE))
 
     def _unlike_last(self, seconds: float) -> float:
         """A hold that is not that of the completing item, as items read back have no names."""
         whole = float(math.ceil(min(seconds, _LONGEST_HOLD - 1.0)))
-        last = max(math.ceil(self._task.service_time), _SETTLE)
+        last = max(math.ceil(self._task.service_time), SETTLE)
         return whole + (whole == last and math.dist(self._way[0], self._way[-1]) < _SAME)
 
     def _turned(self, turn: ActionCommand | None) -> Iterator[PlacedItem]:
