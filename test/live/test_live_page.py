@@ -18,6 +18,7 @@ from small_run import (
     state,
     statuses,
     uavs,
+    zones,
 )
 
 HOSTILE = '<img src=x onerror="window.hacked=1">'
@@ -301,3 +302,31 @@ def test_the_end_of_the_fleet_and_of_each_uav_and_the_services_are_shown(view, r
         BEGIN + 60, t1='COMPLETED u1', t2='COMPLETED u2', t3='COMPLETED u2'))
     page = view(done.snapshots)
     wait(page, '#finish', 'Nothing is left to fly; the last task was done at 1:00.')
+
+
+def test_the_head_counts_pieces_and_one_of_each_as_one(view):
+    names = ['line#1', 'line#2']
+    ends = [[0.0, 0.0, 40.0], [200.0, 0.0, 40.0]]
+    line = {'id': 'line', 'position': ends[0], 'work': 'LINE', 'path': ends, 'holes': []}
+    rows = [{'task': name, 'state': 'ASSIGNED', 'uav': 'u1', 'reason': '', 'done': 0, 'pieces': 2}
+            for name in ('line', *names)]
+    listed_ways = listed(BEGIN, 'u1', 1, names)
+    listed_ways['tasks'] = [{**row, 'way': ends} for row in listed_ways['tasks']]
+    page = view(Run().add(
+        {'kind': 'announcement', 'wall': BEGIN, 'action': 'ADD', 'tasks': [line]},
+        zones(BEGIN, ('z', 90.0, 90.0, 20.0)), listed_ways,
+        {'kind': 'statuses', 'wall': BEGIN, 'statuses': rows},
+        state(BEGIN, 'u1', (0.0, 0.0))).snapshots)
+    assert text(page, '#counts') == (
+        '0 of 1 task done, 2 pieces to fly; 1 UAV; 1 zone; 0 re-plans')
+
+
+def test_the_hint_of_the_search_fits(view):
+    page = view(Run().add(*FIRST).snapshots)
+    page.set_viewport_size({'width': 1440, 'height': 900})
+    assert page.evaluate("""() => {
+        const node = document.querySelector('#find'), style = getComputedStyle(node);
+        const context = document.createElement('canvas').getContext('2d');
+        context.font = `${style.fontSize} ${style.fontFamily}`;
+        return context.measureText(node.placeholder).width + parseFloat(style.paddingLeft)
+            + parseFloat(style.paddingRight) - node.clientWidth; }""") <= 0.0

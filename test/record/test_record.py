@@ -210,7 +210,7 @@ def test_the_status_lines_show_the_progress():
     allocation = 'allocation', {'solve_ms': 101.4, 'trigger': '1 new task'}
     run = run_state(*DONE, zones(HUT), allocation, tasks_left('a', 'b'))
     assert headline(run, 12.3) == (
-        '   12 s  1 of 2 tasks completed, 1 unassigned; 1 zones; 0 re-plans, last 101 ms '
+        '   12 s  1 of 2 tasks completed, 1 unassigned; 1 zone; 0 re-plans, last 101 ms '
         '(1 new task)')
     line, = fleet_lines(run, now=3.0)
     assert line.split() == ['u1', 'standby', '-', '2', 'to', 'fly', 'mission', 'verified',

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The study of waiting: reproducible arrivals, all tasks served, paired runs, its last line."""
 import json
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 
 import numpy as np
@@ -11,7 +11,7 @@ from uav_task_alloc.anticipation import event_simulation as events
 from uav_task_alloc.anticipation.cover import COVER_PRICES
 from uav_task_alloc.anticipation.places import MOVE_PRICES
 from uav_task_alloc.cli import study as command
-from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.errors import AllocError, InvalidValue
 from uav_task_alloc.study import anticipation, arrivals, executors
 from uav_task_alloc.study.waiting_runs import POLICIES, Setting, arrival_rate, fly, run_pair
 
@@ -123,6 +123,14 @@ def test_waiting_where_tasks_come_from_is_sooner():
             for policy in (events.STAY, events.LEARNT, events.ORACLE)}
     assert mean[events.ORACLE] < 0.95 * mean[events.STAY]
     assert mean[events.LEARNT] < 0.97 * mean[events.STAY]
+
+
+def test_a_process_that_is_killed_is_an_error_in_one_line(monkeypatch):
+    def killed(setting):
+        raise BrokenExecutor('terminated abruptly')
+    monkeypatch.setattr(anticipation, 'arrival_rate', killed)
+    with pytest.raises(AllocError, match=r'was killed: expected memory.*terminated abruptly'):
+        anticipation.run_study(anticipation.Study(), one_thread, print)
 
 
 def test_the_last_line_of_the_study_is_one_json_object(monkeypatch, capsys):

@@ -23,8 +23,9 @@ def headline(run: RunState, clock: float) -> str:
     counts = ''.join(f', {run.count(state)} {state.lower()}' for state in (
         'ACTIVE', 'ASSIGNED', 'PENDING', 'UNASSIGNED', 'REJECTED', 'FAILED', 'CANCELLED')
         if run.count(state))
+    zones = len(run.zones_now())
     text = (f'{clock:5.0f} s  {run.count("COMPLETED")} of {len(run.tasks)} tasks completed'
-            f'{counts}; {len(run.zones_now())} zones')
+            f'{counts}; {zones} zone{"s" * (zones != 1)}')
     if run.solves:
         replans = run.replans()
         last = (replans or run.solves[:1])[-1]  # a plan that changed nothing is no re-plan

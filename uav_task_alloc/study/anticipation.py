@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import dataclass
 
 import numpy as np
 
+from uav_task_alloc.errors import AllocError
 from uav_task_alloc.study.arrivals import ARRIVAL_KINDS, DURATION
 from uav_task_alloc.study.campaign import ExecutorFactory
 from uav_task_alloc.study.learning import confidence
@@ -43,9 +44,16 @@ def run_study(study: Study, open_executor: ExecutorFactory,
 
     Returns:
         By setting the results of its runs.
+
+    Raises:
+        AllocError: a process was killed.
     """
-    with open_executor() as executor:
-        return dict(_settings(study, executor, log))
+    try:
+        with open_executor() as executor:
+            return dict(_settings(study, executor, log))
+    except BrokenExecutor as error:
+        raise AllocError('a process of the study was killed: expected memory for all of them; '
+                         f'with fewer --jobs they need less ({error})') from None
 
 
 def _settings(study: Study, executor: Executor,

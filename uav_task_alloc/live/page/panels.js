@@ -38,6 +38,14 @@ export function taskButton(id) {
   return button;
 }
 
+const many = (count, word) => `${count} ${word}${count === 1 ? '' : 's'}`;
+
+// In lists are the pieces of a task, not the task.
+function leftToFly(model, done) {
+  const left = [...model.lists.values()].flat().length;
+  return left > model.ids.length - done ? `${many(left, 'piece')} to fly` : `${left} to fly`;
+}
+
 export function showHead(model, past) {
   const done = model.ids.filter(id => stateOf(id, model)[0] === 'COMPLETED').length;
   const silent = model.uavs.filter(uav => uav.lost).length, {clock} = live;
@@ -46,10 +54,9 @@ export function showHead(model, past) {
   $('progress').max = model.ids.length || 1;
   $('progress').value = done;
   put($('counts'), model.uavs.length + model.ids.length === 0 ? 'waiting for UAVs and tasks'
-    : `${done} of ${model.ids.length} tasks done, ${model.turns.size} to fly; `
-    + `${model.uavs.length} UAVs${silent ? `, ${silent} silent` : ''}; `
-    + `${model.zones.length} zones; `
-    + `${replans} re-plans`);
+    : `${done} of ${many(model.ids.length, 'task')} done, ${leftToFly(model, done)}; `
+    + `${many(model.uavs.length, 'UAV')}${silent ? `, ${silent} silent` : ''}; `
+    + `${many(model.zones.length, 'zone')}; ${many(replans, 're-plan')}`);
   const rate = Number(clock.rate.toPrecision(3));
   put($('rate'), rate === 1 ? '' : `at ${rate} × real time`);
   showAlarm(model.uavs.filter(uav => uav.trouble));
