@@ -175,6 +175,8 @@ class FlownPath:
     def fastest(self) -> float:
         """The highest speed [m/s] of late; the usual one where it has hardly moved."""
         speeds = self._speeds[-200:]
+        if speeds and (top := max(speeds)) >= _USUAL_SPEED:
+            return top
         moving = sum(speed > _HOLD_SPEED for speed in speeds)
         return max(5.0 if moving >= _FEW else _USUAL_SPEED, *speeds)
 
