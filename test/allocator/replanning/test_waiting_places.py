@@ -303,3 +303,72 @@ def test_the_area_of_work_holds_all_tasks_and_changes_seldom():
 def test_an_area_without_extent_is_refused(area):
     with pytest.raises(InvalidValue, match='anticipate_area'):
         AllocatorParams(anticipate_area=area)
+
+
+class RandomService(IdleFleet):
+    """UAVs that fly their lists while orders, zones and losses of authority come at random."""
+
+    def __init__(self, seed):
+        super().__init__((0.0, 0.0, 50.0), (200.0, 0.0, 50.0), (400.0, 0.0, 50.0), seen=0,
+                         locked_tasks=0, separation__horizontal=20.0)
+        self.rng, self.number, self.sent = np.random.default_rng(seed), 0, 0
+
+    def step(self):
+        """An event and two seconds of flight."""
+        uav_id, driver = str(self.rng.choice(list(self.places))), self.driver
+        event = self.rng.integers(8)
+        if event < 2:
+            self.number += 1
+            driver.add((f't{self.number}', *self.rng.uniform(-900.0, 900.0, 2)))
+        elif event < 5:
+            driver.order(('PAUSE', 'RESUME', 'RETURN')[event - 2], uav_id)
+        elif event == 5:
+            held = self.rng.random() < 0.7
+            self.more[uav_id] = {} if held else {'authority': 'LOST', 'available': False}
+        elif event == 6:
+            zones = [ThreatZone.cylinder('z', tuple(self.rng.uniform(-900.0, 900.0, 2)), 80.0)]
+            driver.world.set_zones(zones if self.rng.random() < 0.5 else [], (), driver.now)
+        self.fly()
+        self.wait(2.0)
+        self.check()
+
+    def fly(self):
+        """Each UAV that may be flown is at the end of its waiting way, or has done a task."""
+        for uav_id in self.places:
+            each = self.driver.world.list_of(uav_id)
+            if 'authority' in self.more.get(uav_id, {}):
+                continue
+            if each.stops:
+                self.places[uav_id] = each.stops[0].exit
+                self.driver.event('COMPLETED', each.stops[0].task.id, uav_id)
+            elif each.waiting_place is not None:
+                self.places[uav_id], self.sent = each.waiting_place, self.sent + 1
+
+    def check(self):
+        world = self.driver.world
+        ids = [t for each in world.lists_in_force().values() for t in each.task_ids]
+        assert len(ids) == len(set(ids))
+        for uav_id in self.places:
+            each = world.list_of(uav_id)
+            assert each.returns or not (each.stops and each.end_via)
+            if each.waiting_place is not None:
+                assert world.orders.of_uav(uav_id) is None
+                assert world.uav_record(uav_id).report.authority == 'HELD'
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_with_waiting_places_no_task_is_lost_and_no_order_is_broken(seed):
+    service = RandomService(seed)
+    for _ in range(120):
+        service.step()
+    service.more.clear()
+    service.driver.world.set_zones((), (), service.driver.now)
+    for uav_id in service.places:
+        service.driver.order('RESUME', uav_id)
+    for _ in range(40):
+        service.fly()
+        service.wait(2.0)
+        service.check()
+    states = {record.state.name for record in service.driver.world.task_records().values()}
+    assert states == {'COMPLETED'}
+    assert service.sent > 5
