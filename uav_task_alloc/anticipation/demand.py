@@ -31,13 +31,13 @@ class DemandModel:
     bandwidths: tuple[float, ...] = (400.0, 800.0, 1600.0, 3200.0)  # [m]
     forgetting: tuple[float, ...] = (450.0, 1200.0, 3600.0, math.inf)  # [s]
     day_parts: int = 8  # of estimates by the time of day, one for each bandwidth; 0: none
-    spots: int = 5  # of a mixture at most
+    spots: int = 4  # of a mixture at most
     spot_size: float = 1000.0  # [m] standard deviation of a spot at its begin
     spot_forgetting: tuple[float, ...] = (1200.0, math.inf)  # [s] of each mixture of spots
     prior: float = 1.0  # tasks that the uniform prior is worth
-    even: float = 0.7  # share of the estimate that tasks are uniform, at the begin
-    spot_share: float = 0.2  # of mixtures of spots together, at the begin
-    share: float = 0.005  # of its weight that an estimate hands out to all at each task
+    even: float = 0.65  # share of the estimate that tasks are uniform, at the begin
+    spot_share: float = 0.3  # of mixtures of spots together, at the begin
+    share: float = 0.002  # of its weight that an estimate hands out to all at each task
 
 
 class Observation(NamedTuple):

@@ -13,9 +13,9 @@ from uav_task_alloc.kernel import inner_kernel
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _STEPS = 2  # of expectation and maximisation at each task
-_SIZE_PRIOR = 3.0  # tasks that the size of a spot at its begin is worth
-_LEAST_TASKS = 0.3  # that a spot loses to others, so that spots without tasks vanish
-_BACKGROUND_PRIOR = 4.0  # tasks of the background
+_SIZE_PRIOR = 6.0  # tasks that the size of a spot at its begin is worth
+_LEAST_TASKS = 0.1  # that a spot loses to others, so that spots without tasks vanish
+_BACKGROUND_PRIOR = 2.0  # tasks of the background
 
 
 class Spots(NamedTuple):
