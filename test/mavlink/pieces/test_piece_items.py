@@ -130,6 +130,16 @@ def test_a_gap_that_the_speed_explains_is_flown():
     assert flown.covered
 
 
+def test_a_gap_while_another_mission_may_be_on_board_is_not_flown():
+    flown = Flown().fly(at(0, 0), at(100, 0))
+    flown.coverage.mission_known = False
+    flown.t += 400.0 / SPEED
+    assert not flown.coverage.covers('L', flown.t, SPEED)
+    flown.fly(at(300, 200), at(300, 300))
+    assert not flown.covered
+    assert flown.leave().rest() == [(100, 0), (300, 0), (300, 300)]
+
+
 def test_a_gap_that_is_too_short_for_the_way_is_not_flown():
     flown = Flown().fly(at(0, 0), at(100, 0))
     flown.t += 4.0

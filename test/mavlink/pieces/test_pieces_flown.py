@@ -245,3 +245,21 @@ def test_a_wait_before_a_way_is_kept_and_the_way_flown_once(kind, waiting):
     for each in (strip(0), strip(1)):
         assert set(track.times_flown(each)) == {1}
         assert max(b - a for a, b in pairwise(pictures_of(bench, each))) <= 23.0
+
+
+def test_a_way_left_in_silence_for_a_list_that_is_not_confirmed_is_flown_later():
+    line = piece('L', (0, 60), (200, 60))
+    other = piece('M', (150, 80), (300, 80))
+    bench, track = surveying('px4', list_of(line, other))
+    halfway(bench, line, 20.0)
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        direction == 'down' and m.get_type() == 'MISSION_ACK') else None)
+    bench.assign(list_of(other, line, revision=2))
+    assert bench.run(lambda: bench.onboard().upload.may_be_stored, 10.0)
+    bench.run(limit=0.3)
+    bench.line.cut = True
+    bench.run(limit=14.0)
+    bench.line.cut = False
+    bench.line.tampers.clear()
+    assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
+    assert min(track.times_flown(line)) == 1

@@ -219,7 +219,7 @@ class OnboardMission:
     def step(self, now: float) -> list[Message]:
         """Advance time; returns the messages to send."""
         out = self.upload.step(now)
-        self._reports.credit_waiting(self.unknown_upload, now)
+        self._reports.step(self.unknown_upload, now)
         if self._starts_at_flown() and not self.upload.sent_all:
             out += self.upload.cancel(now)
         self._settle(now)

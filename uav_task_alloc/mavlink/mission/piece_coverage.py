@@ -89,10 +89,11 @@ class PieceCoverage:
 
     Attributes:
         version: changes with the ways that are left.
+        mission_known: whether the mission on board is known, so that what is flown in silence is.
     """
 
     def __init__(self, plane: bool = False) -> None:
-        self.version = 0
+        self.version, self.mission_known = 0, True
         self._corridor = _CORRIDOR_PLANE if plane else _CORRIDOR
         self._pieces: dict[str, _Piece] = {}
         self.left: deque[str] = deque(maxlen=_KEPT)  # ways that were left, to be taken
@@ -200,12 +201,13 @@ class PieceCoverage:
         if piece.seen is None:
             piece.seen = min(before, sample.t) if math.isfinite(before) else sample.t
         since, back = piece.off or (piece.seen, 0.0)
-        gap = max(sample.t - since, 0.0)
+        silent = sample.t - before > GAP
+        gap = max(sample.t - since, 0.0) if self.mission_known or not silent else 0.0
         reach = max(_MARGIN * fastest * gap - back, 0.0) + _SLACK
         metres = self._metres(piece, sample.position, reach)
         if metres is not None:
             piece.flown, piece.seen, piece.off = max(piece.flown, metres), sample.t, None
-        elif gap > GAP and sample.t - before > GAP and (
+        elif gap > GAP and silent and (
                 piece.way_at[-1] - piece.flown + math.dist(sample.position, piece.way[-1])
                 <= reach):
             piece.flown, piece.seen, piece.off = piece.way_at[-1], sample.t, None
@@ -242,7 +244,7 @@ class PieceCoverage:
         if left <= self._corridor + _SLACK:
             return True
         # nothing was received since it was on its way
-        blind = piece.seen is not None and self._sampled <= piece.seen
+        blind = self.mission_known and piece.seen is not None and self._sampled <= piece.seen
         return blind and left <= _SLACK + self._corridor + _MARGIN * fastest * max(
             0.0, vehicle_now - (piece.seen or 0.0))
 

@@ -203,11 +203,12 @@ class ReportsDuringUpload:
         for seq, _, _ in self.begin_new(uploaded):
             self._progress.credit(uploaded.items[seq])
 
-    def credit_waiting(self, uploaded: MissionDiff | None, now: float) -> None:
+    def step(self, uploaded: MissionDiff | None, now: float) -> None:
         """Credit by the positions what waits for longer than any message, and keep it.
 
         A readback may take long, and a bridge that is killed meanwhile would lose it.
         """
+        self._progress.coverage.mission_known = uploaded is None
         waiting = [each for each in self._reached if (each.frame, each.last_frame)
                    not in self._judged and now - self._first_at(each) >= MAX_MESSAGE_DELAY]
         if waiting and uploaded is not None:
