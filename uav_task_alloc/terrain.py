@@ -21,6 +21,7 @@ _CHUNK = 100.0  # [m] of a leg that is straight in the grid: the earth's curve o
 _SLACK = 0.05  # [m] more than asked for, for that and for rounding
 _MOST_POINTS = 200  # that are added to a leg
 _LARGEST = 200_000_000  # nodes of a raster
+_DEGREES = 4326  # EPSG number of longitude and latitude of WGS84
 
 
 class TerrainError(AllocError, ValueError):
@@ -291,7 +292,12 @@ def read_terrain(path: Path, origin: Origin) -> Terrain:
     if not np.isfinite(heights).any():
         raise TerrainError(f'{path}: it has no data: expected heights')
 
+    degrees = crs.to_epsg() == _DEGREES
+
     def to_grid(longitude: _Floats, latitude: _Floats) -> tuple[_Floats, _Floats]:
+        if degrees:  # a call of GDAL takes a millisecond
+            return (a * longitude + b * latitude + c - 0.5,
+                    d * longitude + e * latitude + f - 0.5)
         try:
             xs, ys = transform('EPSG:4326', crs, longitude.tolist(), latitude.tolist())[:2]
         except Exception:  # errors of GDAL have no public base
