@@ -78,28 +78,34 @@ def test_without_zones_no_kernel_that_finds_paths_around_them_is_loaded():
 
 
 NOTICE = """
+import os
+import sys
+
 from uav_task_alloc.kernel_cache import NOTICE, KernelWork
 from uav_task_alloc.solver.{solver} import {load}
 
-with NOTICE.until_loaded('other', KernelWork(99.0, 9)):  # compiles nothing, prints nothing
-    pass
-{load}(zones={zones}, search=False)
-if {search}:
-    {load}(zones={zones})
-NOTICE.on_start(type('Event', (), dict(data=dict(module='uav_task_alloc.a', name='ssa'))))
+for zones, search in ((False, False), (True, False), (True, True)):
+    if os.fork():  # a process for each, which has loaded no kernel
+        assert os.wait()[1] == 0
+        continue
+    with NOTICE.until_loaded('other', KernelWork(99.0, 9)):  # compiles nothing, prints nothing
+        pass
+    {load}(zones=zones, search=False)
+    if search:
+        {load}(zones=zones)
+    NOTICE.on_start(type('Event', (), dict(data=dict(module='uav_task_alloc.a', name='ssa'))))
+    sys.exit()
 """
 STATED = r'compiling kernels \(once, about (\d+) s(?: to a first plan, (\d+) s in all)?\)\n'
 
 
 def test_the_notice_states_the_time_of_what_is_loaded():
-    def stated(solver, load, zones, search):
-        done = subprocess.run([sys.executable, '-c', NOTICE.format(
-            solver=solver, load=load, zones=zones, search=search)],
-            capture_output=True, text=True, check=True)
-        return [float(each or 0.0) for each in re.fullmatch(STATED, done.stderr).groups()]
-    for names in (('solve', 'load_kernels'), ('timed.solve', 'load_timed_kernels')):
-        first, whole = stated(*names, False, False)
-        first_zones, whole_zones = stated(*names, True, False)
+    for solver, load in (('solve', 'load_kernels'), ('timed.solve', 'load_timed_kernels')):
+        done = subprocess.run([sys.executable, '-c', NOTICE.format(solver=solver, load=load)],
+                              capture_output=True, text=True, check=True)
+        (first, whole), (first_zones, whole_zones), rest = (
+            [float(each or 0.0) for each in re.fullmatch(STATED, line).groups()]
+            for line in done.stderr.splitlines(keepends=True))
         assert 0.0 < first < whole < whole_zones < 99.0
         assert first < first_zones
-        assert stated(*names, True, True) == [whole - first, 0.0]
+        assert rest == [whole - first, 0.0]
