@@ -229,3 +229,10 @@ def test_after_a_loss_only_unflown_lines_are_planned_and_as_well_as_from_nothing
     for uav_id, held in left.locked.items():
         assert warm.routes[uav_id][:1] == held
     assert warm.finish <= 1.05 * fresh.finish
+
+
+@pytest.mark.parametrize('seed', [90054, 90063, 90088, 90104])
+def test_plans_of_few_lines_are_optimal_in_both_directions(seed):
+    result = compare_small(small_problem(seed, 7, paths=0.8, plain=True), 800)
+    assert (result.faults, result.warm_faults) == ((), ())
+    assert result.gap < 1e-6

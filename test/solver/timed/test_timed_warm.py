@@ -2,8 +2,19 @@
 """Warm starts with time: what still holds of the earlier plan stays; payloads on board too."""
 from dataclasses import replace
 
+import numpy as np
+import pytest
+
 from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.objective import OBJECTIVES
+from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.solve import plan
+from uav_task_alloc.solver.timed import solve
+from uav_task_alloc.solver.timed.colony import WARM_AND_FRESH, TimedColony
+from uav_task_alloc.solver.timed.order import route_order
+from uav_task_alloc.solver.timed.problem import make_timed
+from uav_task_alloc.solver.timed.warm import first_plan
+from uav_task_alloc.solver.warm import WarmState
 
 BASE = (0.0, 0.0, 0.0)
 
@@ -55,3 +66,42 @@ def test_locked_tasks_stay_first_and_count_against_windows_of_others():
     found = plan([uav], tasks, budget=0.02, locked={'a': ['held']})
     assert found.routes['a'] == ('held', 'open')
     assert found.unassigned['near'] == 'latest 120 s; the earliest arrival is 190 s (a)'
+
+
+def after_a_loss(objective):
+    """A plan of 40 tasks of four UAVs, and what is asked when the last of them is lost."""
+    uavs = [Uav(f'u{i}', (300.0 * i, 0.0, 0.0)) for i in range(4)]
+    tasks = [Task(f't{i}', (30.0 * i, 100.0, 0.0)) for i in range(40)]
+    before = plan(uavs, tasks, budget=9.0, max_iterations=200, objective=objective)
+    return uavs[:3], tasks, before
+
+
+@pytest.mark.parametrize(('objective', 'some'), [('finish', True), ('balanced', False)])
+def test_half_of_a_search_for_an_early_finish_begins_at_new_routes_after_a_loss(
+        objective, some, monkeypatch):
+    uavs, tasks, before = after_a_loss(objective)
+    begun = []
+    monkeypatch.setattr(solve, 'TimedColony', lambda problem, first, seed, params, begin: (
+        begun.append(begin is not None) or TimedColony(problem, first, seed, params, begin)))
+    plan(uavs, tasks, budget=9.0, max_iterations=100, warm=before, objective=objective)
+    left = [task for task in tasks if task.id not in before.routes['u3']]
+    plan(uavs, [*left, tasks[-1]], budget=9.0, max_iterations=100, warm=before,
+         objective=objective)  # a single new task
+    assert begun == [some, False]
+
+
+@pytest.mark.parametrize(('rounds', 'fresh'), [(1000, True), (10, False)])
+def test_a_search_goes_on_from_other_routes_where_there_are_rounds_enough(rounds, fresh):
+    uavs, tasks, before = after_a_loss('finish')
+    rules = Rules(objective=OBJECTIVES['finish'])
+    problem = make_timed(make_problem(uavs, tasks, {}, Limits(), rules), {})
+    first, begin = first_plan(problem, before.state), first_plan(problem, WarmState())
+    colony = TimedColony(problem, first, 1, WARM_AND_FRESH, begin)
+    colony.fly(0.0, 0.02, rounds)
+    colony.fly(0.3, 0.5, 0)
+    held = colony.best.order.copy()
+    colony.fly(0.51, 0.52, 0)
+    order = np.empty_like(begin.order)
+    route_order(colony.arrays, colony.routes, order)
+    assert (order == begin.order).all() == fresh
+    assert (colony.best.order == held).all()

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uav_task_alloc.solver.rng import rng_state
+from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.problem import (
@@ -24,6 +25,10 @@ GIVING_UP = 0.6  # share after which a search through excess ends that found not
 # rounds a task from which on passing through excess pays: where durations or trips are limited,
 # and where only windows and loads are
 PRICED_ROUNDS, PRICED_WINDOW_ROUNDS = 200.0, 1000.0
+FRESH_ROUNDS = 15.0  # rounds a task from which on a second search from new routes pays
+# probability that a place is passed over where there are at most FEW_TASKS, not BLINK_RATE: the
+# cheapest places of all of them are soon the same in each round
+FEW_TASKS, FEW_BLINKS = 10, 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +56,8 @@ SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
                         first_price=math.inf)
 WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
                    short_end_temperature=0.02, first_price=math.inf)
+# many tasks are new: half of the time each from the earlier routes, and from new ones
+WARM_AND_FRESH = replace(WARM, restart=0.5, reheat_temperature=COLD.start_temperature)
 
 
 class TimedColony:
@@ -61,10 +68,12 @@ class TimedColony:
         start: the first routes.
         seed: of the random numbers.
         params: of the colony.
+        begin: other routes, which a search with the parameters WARM_AND_FRESH goes on from in its
+            second half, where there are enough rounds for it.
     """
 
     def __init__(self, problem: TimedProblem, start: Incumbent, seed: int,
-                 params: TimedParams) -> None:
+                 params: TimedParams, begin: Incumbent | None = None) -> None:
         arrays = problem.arrays
         self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy())
         self.best = copy_incumbent(start)
@@ -72,14 +81,17 @@ class TimedColony:
         self._goal, self._decided = problem.base.rules.objective, False
         self.routes = empty_timed_routes(self.arrays)
         set_order(self.arrays, self.routes, start.order)
+        self._begin = begin
         self._price, self._flown = arrays.price, 0
         self._gains = 1  # improvements, from when on excess is allowed
         self._restarted, self._end_temperature = False, params.end_temperature
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
+        tasks = arrays.ends - arrays.uavs
         growth = 1.0 if problem.prizes else params.unserved_growth
         self._rises = Rises(np.full(4, math.inf), np.full(4, math.inf), growth,
                             MAX_UNSERVED_GROWTH * arrays.unserved, params.absent,
-                            params.skipped, params.by_value, problem.prizes)
+                            params.skipped, params.by_value,
+                            FEW_BLINKS if tasks <= FEW_TASKS else BLINK_RATE, problem.prizes)
 
     def _allow_excess(self) -> None:
         """Set prices of excess, which the best has none of, where it is not allowed so far."""
@@ -122,6 +134,8 @@ class TimedColony:
         if not self._decided and spent >= DECISION:
             self._decided = True
             tasks = self.arrays.ends - self.arrays.uavs
+            if self._begin is not None and self._flown / spent < FRESH_ROUNDS * tasks:
+                self._params, self._begin = WARM, None
             least = PRICED_ROUNDS if self.arrays.whole else PRICED_WINDOW_ROUNDS
             if (self._flown / spent >= least * tasks
                     and math.isfinite(self._params.first_price)):
@@ -132,7 +146,9 @@ class TimedColony:
             self._forbid_excess()
         if spent >= self._params.restart and not self._restarted:
             self._restarted = True
-            set_order(self.arrays, self.routes, self.best.order)
+            if self._begin is not None:
+                self._end_temperature = COLD.short_end_temperature
+            set_order(self.arrays, self.routes, (self._begin or self.best).order)
         self._gains += anneal(self.arrays, self.routes, self._round, self.best, self._rises,
                               self._params.ruin, self._temperature(spent),
                               self._temperature(until), rounds, self._rng)

@@ -10,7 +10,6 @@ import numpy as np
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import inline_kernel, inner_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, uniform
-from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import (
@@ -70,6 +69,7 @@ class Rises(NamedTuple):
     absent: int  # absent tasks that a round tries to insert, besides those it removes
     skipped: float  # probability that a round passes over one of them
     by_value: float  # share of rounds that insert about the most valuable tasks first
+    blinks: float  # probability that a place is passed over
     prizes: bool  # tasks may be left out because they are not worth their way
 
 
@@ -118,7 +118,8 @@ def _update_prices(a: TimedArrays, r: TimedRoutes, w: Round, rises: Rises) -> No
             else:
                 a.price[c] = max(rises.least[c], a.price[c] * PENALTY_DECAY)
     list_absent(a, r, w)
-    if rises.unserved == 1.0 or w.counts[ABSENT] >= FEW_ABSENT * (a.ends - a.uavs):
+    few = max(2.0, FEW_ABSENT * (a.ends - a.uavs))  # a single task is few, however few there are
+    if rises.unserved == 1.0 or w.counts[ABSENT] >= few:
         return
     for k in range(w.counts[ABSENT]):
         i = w.absent[k] - a.uavs
@@ -150,7 +151,7 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
             generous += uniform(rng)
         if opening and w.counts[REMOVED] > 0 and r.link[seed, at.OF_UAV] == a.uavs:
             open_route(a, r, w, seed)
-        insert_removed(a, r, w, generous, rises.by_value, BLINK_RATE, rng)
+        insert_removed(a, r, w, generous, rises.by_value, rises.blinks, rng)
         if cost_of(a, r.sums) < before - temperature * math.log(1.0 - uniform(rng)):
             improvements += int(record(a, r, best, rises.prizes))
         else:

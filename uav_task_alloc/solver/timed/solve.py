@@ -24,6 +24,7 @@ from uav_task_alloc.solver.timed.colony import (
     COLD,
     SELECTION,
     WARM,
+    WARM_AND_FRESH,
     TimedColony,
     TimedParams,
 )
@@ -35,6 +36,7 @@ from uav_task_alloc.solver.timed.warm import completed, first_plan
 from uav_task_alloc.solver.warm import WarmState
 
 SOLVER_NAME = 'chain_q'
+MANY_NEW = 0.05  # share of the tasks that are not in the routes of the earlier plan
 
 
 def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
@@ -95,11 +97,27 @@ def _improve(recorder: TimedRecorder, seed: int, before: WarmState,
     recorder.offer(first)
     if not problem.base.tasks or not problem.base.uavs or recorder.over():
         return first
-    params = params or _params(problem, first, recorder.warm)
-    run_colonies([TimedColony(problem, first, seed + 7919 * i, params)
+    begin = first_plan(problem, WarmState()) if _many_new(problem, before) else None
+    params = params or (WARM_AND_FRESH if begin else _params(problem, first, recorder.warm))
+    run_colonies([TimedColony(problem, first, seed + 7919 * i, params, begin)
                   for i in range(recorder.threads)], recorder)
     recorder.offer(completed(problem, recorder.best))
     return first
+
+
+def _many_new(problem: TimedProblem, before: WarmState) -> bool:
+    """Whether half of the search begins at new routes, not at those of the earlier plan.
+
+    For an early finish the tasks of a lost UAV have to be shared by all others: a search that
+    begins with them in the routes of its neighbours does not always come that far.
+    """
+    goal = problem.base.rules.objective
+    if goal.finish == 0.0 or goal.response > 0.0:
+        return False
+    known = {name for uav in problem.base.uavs for trip in before.trips_of(uav.id)
+             for name in trip}
+    new = sum(task.id not in known for task in problem.base.tasks)
+    return bool(known) and new > MANY_NEW * len(problem.base.tasks)
 
 
 def _params(problem: TimedProblem, first: Incumbent, warm: bool) -> TimedParams:
