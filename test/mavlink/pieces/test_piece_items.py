@@ -140,22 +140,6 @@ def test_a_gap_while_another_mission_may_be_on_board_is_not_flown():
     assert flown.leave().rest() == [(100, 0), (300, 0), (300, 300)]
 
 
-def test_a_gap_after_the_mission_was_replaced_is_not_flown():
-    flown = Flown().fly(at(0, 0), at(100, 0))
-    flown.coverage.note_replaced(Item(16, task='X'))
-    flown.t += 400.0 / SPEED
-    flown.fly(at(300, 200), at(300, 300), item=Item(16, task='X'))
-    assert not flown.covered
-    assert flown.rest() == [(100, 0), (300, 0), (300, 300)]
-
-
-def test_a_mission_that_continues_a_way_leaves_nothing():
-    flown = Flown().fly(at(0, 0), at(100, 0))
-    flown.coverage.note_replaced(ALONG)
-    assert flown.fly(at(100, 0), at(300, 0), at(300, 300)).covered
-    assert not flown.coverage.left
-
-
 def test_a_gap_that_is_too_short_for_the_way_is_not_flown():
     flown = Flown().fly(at(0, 0), at(100, 0))
     flown.t += 4.0

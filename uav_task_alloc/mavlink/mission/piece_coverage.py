@@ -170,13 +170,6 @@ class PieceCoverage:
             for sample in self._recent:
                 self._follow(piece, sample, sample.t, self._fastest)
 
-    def note_replaced(self, item: Item | None) -> None:
-        """Note another mission: a way that its first item does not continue is left here."""
-        if self._under_way is not None and (
-                item is None or not item.along or item.task != self._under_way):
-            self.note_active(None, True)
-            self._leave(self._ending)
-
     def _leave(self, name: str | None) -> None:
         """Fly the rest of a way from where it was left."""
         piece = self._pieces.get(name or '')

@@ -181,7 +181,6 @@ class ProgressTable:
                 epoch.items, epoch.since, self.positions.vehicle_time(now), self.may_end(now),
                 now + REPEAT_WINDOW, epoch.taken))
         epoch.items, epoch.current = items, start
-        self.coverage.note_replaced(self.active)
         self._reached.begin()
         self._moves.begin(None if read or start == len(items) else start, now)
         if read:
