@@ -48,7 +48,7 @@ FIRST_SEED = 9000  # of the runs that are reported; others were flown while this
 
 
 class Flight:
-    """One UAV: flies its list, holds where it is told to, and changes its battery at its base."""
+    """One UAV: flies its list, holds, and changes its battery at its base."""
 
     def __init__(self, name: str, base: Point) -> None:
         self.name, self.base, self.place = name, base, base

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report shows strips: planned for whom, flown by whom, interrupted, and what is covered."""
+"""The report shows strips: UAV of the plan, UAV that flew, breaks, and coverage."""
 import re
 
 import pytest

@@ -68,7 +68,7 @@ def test_the_node_does_not_start_without_its_terrain(start, ridge, west, why):
     path = ridge if west == '9.0' else ridge.parent / 'missing.tif'
     process = start('allocator', '-p', f'terrain:={path}', '-p', 'origin.latitude:=47.0',
                     '-p', f'origin.longitude:={west}', '-p', 'origin.altitude_amsl:=500.0')
-    status, text = process.stop(signal.SIGCONT, 60)  # it has ended by itself
+    status, text = process.stop(signal.SIGCONT, 60)  # it has exited without a signal
     assert status == 1
     assert why in text
     assert 'Traceback' not in text

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The strips and other pieces of a flight: planned for whom, flown by whom, and covered."""
+"""The strips and other pieces of a flight: UAV of the plan, UAV that flew, and coverage."""
 from __future__ import annotations
 
 import math
@@ -32,7 +32,7 @@ class FlownPiece:
     flown_by: str  # UAV that completed it; '': none
     metres: float  # of its way
     share: float | None  # of its way along which a UAV flew; None: its way is not known
-    interrupted: str  # where it was begun and not ended: by whom and when; ''
+    interrupted: str  # the UAV that left it before its end, and when; ''
     way: tuple[Point, ...] = ()  # [m] ENU
 
 
@@ -66,7 +66,7 @@ def _point(given: Sequence[float]) -> Point:
 
 
 def _interrupted(history: FlightHistory, piece: str) -> str:
-    """By whom a piece was left before its end, and when [s]."""
+    """The UAV that left a piece before its end, and when [s]."""
     spans = history.spans.get(piece, [])
     found = []
     for span, after in zip(spans, (*spans[1:], None), strict=True):
