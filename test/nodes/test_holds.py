@@ -7,7 +7,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from test_mavlink_bridge import Sky
 from uav_task_alloc_msgs import msg as m
-from uav_task_alloc_msgs.srv import ReturnUav
+from uav_task_alloc_msgs.srv import ReturnUav, UndoOrder
 
 from uav_task_alloc.model import Task
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, announcement
@@ -70,9 +70,13 @@ def test_a_separation_hold_expires_and_a_bad_message_is_named(sky):
     assert 'goes on: separation ended its hold' in text
 
 
-def give_work(start, probe, sky):
+def start_allocator(start, *more):
+    return start('allocator', '-p', 'route_end:=hold', '-p', 'uav_timeout:=60.0', *more)
+
+
+def give_work(start, probe, sky, *more):
     """Start an allocator and wait until both UAVs fly to its tasks, which are far apart."""
-    start('allocator', '-p', 'route_end:=hold', '-p', 'uav_timeout:=60.0')
+    sky.allocator = start_allocator(start, *more)
     tasks = [Task(f't{k}', (600.0 * (k % 2) - 300.0, 600.0 + 150.0 * k, 50.0)) for k in range(6)]
     probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS).publish(
         announcement(m.TaskAnnouncement.ADD, tasks, 1.0))
@@ -98,6 +102,28 @@ def test_a_uav_that_is_ordered_home_lands_there_and_its_tasks_move_on(start, pro
     assert abs(place.z) < 1.0
     probe.until(lambda: {*sky.completed(1), *sky.completed(2)} == tasks, 120.0)
     assert modes(sky)[n] == S.STANDBY
+
+
+@pytest.mark.parametrize('n', [1, 2])
+def test_a_return_by_order_outlives_a_kill_of_either_node(start, probe, sky, tmp_path, n):
+    state = ('-p', f'state_dir:={tmp_path}/state')
+    tasks = give_work(start, probe, sky, *state)
+    assert order_home(probe, f'uav_{n}').order_id == 'o1'
+    probe.until(lambda: modes(sky)[n] == S.RETURNING, 60.0)
+    sky.allocator.stop(signal.SIGKILL)
+    sky.bridge.stop(signal.SIGKILL)
+    done = set(sky.completed(n))
+    sky.again()
+    start_allocator(start, *state)
+    probe.until(lambda: modes(sky)[n] == S.STANDBY, 120.0)
+    place = sky.states[f'uav_{n}'].position
+    assert math.hypot(place.x - 20.0 * n, place.y) < 3.0  # of its home, where it started
+    probe.until(lambda: {*sky.completed(1), *sky.completed(2)} == tasks, 120.0)
+    assert set(sky.completed(n)) == done
+    assert modes(sky)[n] == S.STANDBY
+    undone = probe.call(UndoOrder, 'allocator/undo_order',
+                        UndoOrder.Request(order_id='o1', operator_name='ann'))
+    assert undone.success, undone.message
 
 
 def test_a_uav_of_a_pilot_is_not_ordered_home(start, probe, sky):
