@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bridge killed and restarted: tasks flown meanwhile are detected, and not flown twice."""
 
+import math
 import random
 from dataclasses import replace
 
@@ -153,6 +154,37 @@ def test_a_task_flown_while_no_bridge_ran_is_not_flown_by_another_uav(kinds):
     assert bench.run(lambda: len(bench.flown(2)) == 2)
     assert places(bench, 2)[1:] == ['D']
     assert 'A was flown by uav_1 while the bridge was down' in bench.notes
+
+
+@pytest.mark.parametrize('kinds', [('ardupilot', 'px4'), ('px4', 'ardupilot')])
+@pytest.mark.parametrize(('unread', 'tasks', 'waits'), [
+    (5.0, 'CBDA', True),  # its tasks went to another UAV before its mission was read
+    (5.0, 'DE', False),  # others did
+    (60.0, 'CBDA', False)])  # its mission cannot be read
+def test_a_uav_waits_for_the_mission_of_the_one_that_may_have_flown_its_tasks(
+        kinds, unread, tasks, waits):
+    bench = FlightBench(*kinds).discover()
+    bench.assign(task_list('ABC', service=1.0))
+    bench.assign(task_list('X'), 2)
+    assert bench.run(lambda: bench.started() == ['A'] and bench.started(2) == ['X'])
+    bench.run(limit=1.5)  # a heartbeat has shown the mission mode
+    read_at = math.inf
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        direction == 'down' and m.get_type() == 'MISSION_COUNT' and m.count >= 3  # of uav_1
+        and now < read_at) else None)
+    dead_until(bench, 3)
+    read_at = bench.now + unread
+    bench.assign(task_list('', 2))
+    bench.assign(task_list(tasks, 3, service=1.0), 2)
+    assert bench.run(lambda: hand_over_in_hold(bench, 2) or (
+        bench.authority(2) is AuthorityState.HELD), 2.0)
+    bench.run(limit=2.5 if unread < 10.0 else 11.0)
+    sent = [m for m in bench.line.sent('MISSION_COUNT') if m.target_system == 2]
+    assert (len(sent) == 1) is waits  # that of 'X'
+    assert bench.run(lambda: len(bench.completed(2)) == len(tasks))
+    if waits:
+        assert bench.run(lambda: 'D' in places(bench, 2))
+        assert not set('ABC').intersection(places(bench, 2))
 
 
 @BOTH

@@ -27,6 +27,7 @@ from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.refused_messages import RefusedMessages, failure
 
+_READ_TIME = 10.0  # [s] after the start in which the missions on board are read, as a rule
 OPERATOR = 'operator'  # source of a hold that outlives a restart
 RemoteKey = Hashable  # link and remote, see `transport.connections.Address`
 Outgoing = list[tuple[RemoteKey, Message]]
@@ -94,6 +95,7 @@ class GroundStation:
         self._early = EarlyMessages()
         self.refusals = RefusedMessages()  # messages and lists whose processing failed
         self._compared: list[tuple[TaskList | None, int]] = []  # lists and flown items
+        self._read_until: float | None = None  # [s]; None: before the first step
 
     def receive(self, address: RemoteKey, message: Message, now: float) -> Outgoing:
         """Process a message; one that is invalid or cannot be processed is dropped and counted.
@@ -140,7 +142,10 @@ class GroundStation:
     def step(self, now: float) -> Outgoing:
         """Advance the time of all executors; returns messages to send, with their addresses."""
         out: Outgoing = []
+        if self._read_until is None:
+            self._read_until = now + _READ_TIME
         try:
+            self._note_unread(now)
             self._drop_flown_by_others(now)
         except Exception as error:
             self.refusals.add('all vehicles', 'compare flown tasks', failure(error), 'error')
@@ -169,6 +174,7 @@ class GroundStation:
         for session in self.sessions.values():
             if session.uav_id == uav_id:
                 try:
+                    self._note_unread(now)
                     return self._addressed(session, session.executor.assign(tasks, now))
                 except Exception as error:
                     self._fault(session, 'task_list', error)
@@ -202,6 +208,21 @@ class GroundStation:
             if session.uav_id == uav_id:
                 return session.executor.hand_over(operator, now)
         raise UnknownName('uav', uav_id, [s.uav_id for s in self.sessions.values()])
+
+    def _note_unread(self, now: float) -> None:
+        """Note for each UAV the tasks that another one may have flown while the bridge was down.
+
+        They are the next ones that the previous run recorded, of UAVs whose missions are not read
+        yet: their flown tasks become known in a moment, and are then not flown by others.
+        """
+        executors = [session.executor for session in self.sessions.values()]
+        reading = self._read_until is not None and now < self._read_until
+        unread = [executor if reading and not executor.onboard.resume.located
+                  and not executor.telemetry.stale(now) else None for executor in executors]
+        for executor in executors:
+            executor.onboard.list.perhaps_flown = frozenset(
+                task for other in unread if other is not None and other is not executor
+                for task in other.onboard.resume.ahead)
 
     def _drop_flown_by_others(self, now: float) -> None:
         """Complete tasks of a list that another UAV has flown while the bridge was down."""

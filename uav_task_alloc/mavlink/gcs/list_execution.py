@@ -47,6 +47,8 @@ class ListExecution:
             return []
         if not telemetry.past_boot:
             return sender.wait_for('the autopilot to start')
+        if onboard.list.awaits_others:
+            return sender.wait_for('the mission of the UAV that flew its tasks before')
         if onboard.list.awaits_speed:
             return sender.wait_for('its cruise speed (WPNAV_SPEED)')
         if self._chosen_by_another():

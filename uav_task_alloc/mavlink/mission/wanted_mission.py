@@ -67,6 +67,7 @@ class WantedMission:
         self._profile, self._origin, self._progress = profile, origin, progress
         self._refused: dict[str, tuple[Task, str]] = {}  # the task as refused, and the reason
         self.waits = Waits()
+        self.perhaps_flown: frozenset[str] = frozenset()  # by another UAV, without the bridge
         # own speed of the vehicle [m/s], whether it is wanted; 0: being read, NaN: not known
         self.read_speed: Callable[[bool], float] = lambda wanted: math.nan
         self.stored_pieces: tuple[PieceMark, ...] = ()  # of the previous run of the bridge
@@ -138,6 +139,12 @@ class WantedMission:
     def awaits_speed(self) -> bool:
         """Whether its cruise speed is being read, which an item of the list needs."""
         return self.cruise() == 0.0
+
+    @property
+    def awaits_others(self) -> bool:
+        """Whether another UAV may have flown one of its tasks while the bridge was down."""
+        return bool(self.perhaps_flown) and any(
+            task.id in self.perhaps_flown for task in self.open_tasks())
 
     def remaining(self) -> TaskList:
         """The list less completed and refused tasks, up to the horizon."""
