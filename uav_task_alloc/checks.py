@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sized
+from enum import Enum
+from typing import TypeVar
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polygon import is_simple, signed_area
 
+_Names = TypeVar('_Names', bound=Enum)
 FAR = 1e8  # [m] bound of all coordinates
 _ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*')
 
@@ -65,6 +68,24 @@ def check_number(place: str, value: float, low: float, high: float = math.inf,
 
 def _number_in(low: float, high: float, open_low: bool) -> str:
     return f'a number in {"(" if open_low else "["}{low:g}, {high:g}]'
+
+
+def check_member(place: str, value: int, names: type[_Names]) -> _Names:
+    """Return the member of an enumeration that has a value.
+
+    Args:
+        place: name of the value in the error text.
+        value: of a member.
+        names: the enumeration, of integers.
+
+    Raises:
+        InvalidValue: there is no such member; the text names all.
+    """
+    try:
+        return names(value)
+    except ValueError:
+        *most, last = (f'{each.name} ({each.value})' for each in names)
+        raise InvalidValue(place, value, f'{", ".join(most)} or {last}') from None
 
 
 def check_count(place: str, many: Sized, most: int) -> None:

@@ -7,7 +7,7 @@ from uav_task_alloc_msgs.srv import SubmitTasks
 
 from uav_task_alloc.allocator.records import AnnouncementAction, TaskVerdict
 from uav_task_alloc.allocator.state.world import World
-from uav_task_alloc.checks import check_count, check_ros_name
+from uav_task_alloc.checks import check_count, check_member, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Task
@@ -62,10 +62,7 @@ def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float
 
 def to_action(msg: m.TaskAnnouncement) -> AnnouncementAction:
     """Raise InvalidValue for an unknown action, or for more than MOST_TASKS tasks."""
-    try:
-        action = AnnouncementAction(msg.action)
-    except ValueError:
-        raise InvalidValue('action', msg.action, 'ADD (0), UPDATE (1) or CANCEL (2)') from None
+    action = check_member('action', msg.action, AnnouncementAction)
     check_count('tasks', msg.tasks, MOST_TASKS)
     return action
 

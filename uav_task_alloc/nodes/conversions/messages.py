@@ -18,8 +18,7 @@ from uav_task_alloc.allocator.records import (
     TaskEventKind,
     UavReport,
 )
-from uav_task_alloc.checks import check_number, check_ros_name
-from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.checks import check_member, check_number, check_ros_name
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_limits import (
@@ -220,11 +219,7 @@ def to_event(msg: m.TaskEvent) -> TaskEvent:
     """
     check_ros_name('task_id', msg.task_id)
     check_ros_name(f'event of task {msg.task_id}: uav_id', msg.uav_id)
-    try:
-        kind = TaskEventKind(msg.event)
-    except ValueError:
-        raise InvalidValue(f'event of task {msg.task_id}: event', msg.event,
-                           'STARTED (0), COMPLETED (1) or FAILED (2)') from None
+    kind = check_member(f'event of task {msg.task_id}: event', msg.event, TaskEventKind)
     return TaskEvent(piece_id(msg.task_id, msg.piece), msg.uav_id, msg.revision, kind,
                      cut(msg.reason))
 

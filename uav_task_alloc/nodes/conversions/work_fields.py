@@ -9,7 +9,7 @@ from geometry_msgs.msg import Point as PointMsg
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.actions import Action
-from uav_task_alloc.checks import check_count, check_number, check_point
+from uav_task_alloc.checks import check_count, check_member, check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point, Task
@@ -31,11 +31,7 @@ def to_kind(msg: m.Task) -> Kind:
     Raises:
         InvalidValue: it is unknown.
     """
-    try:
-        return Kind(msg.kind)
-    except ValueError:
-        raise InvalidValue(f'task {msg.task_id}: kind', msg.kind,
-                           'POINT (0), LINE (1), AREA (2) or ORBIT (3)') from None
+    return check_member(f'task {msg.task_id}: kind', msg.kind, Kind)
 
 
 def to_vertical(msg: m.Task) -> Vertical:
@@ -47,11 +43,7 @@ def to_vertical(msg: m.Task) -> Vertical:
     Raises:
         InvalidValue: it is unknown.
     """
-    try:
-        return Vertical(msg.vertical)
-    except ValueError:
-        raise InvalidValue(f'task {msg.task_id}: vertical', msg.vertical,
-                           'ORIGIN (0) or TERRAIN (1)') from None
+    return check_member(f'task {msg.task_id}: vertical', msg.vertical, Vertical)
 
 
 def to_path(place: str, msg: m.Task, points: Sequence[PointMsg],
