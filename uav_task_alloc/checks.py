@@ -71,12 +71,15 @@ def _number_in(low: float, high: float, open_low: bool) -> str:
 
 
 def check_member(place: str, value: int, names: type[_Names]) -> _Names:
-    """Return the member of an enumeration that has a value.
+    """Check that a number is a value of an enumeration.
 
     Args:
         place: name of the value in the error text.
-        value: of a member.
+        value: the number.
         names: the enumeration, of integers.
+
+    Returns:
+        The member with this value.
 
     Raises:
         InvalidValue: there is no such member; the text names all.
