@@ -2,15 +2,21 @@
 """The default solver, chain_q: bee colonies, one a thread, improve the recorder's best plan."""
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Sequence
 from typing import Any, Protocol
 
 from uav_task_alloc.solver.colony import Colony, ColonyParams
 from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.selection import must_leave_tasks
 from uav_task_alloc.solver.warm import repair
 
 COLD_START = ColonyParams()
+# where not all tasks can be served: the choice of tasks, more than their order
+COLD_SELECTION = ColonyParams(start_temperature=150.0, end_temperature=1.3,
+                              reheat_temperature=60.0, range_penalty=math.inf, skipped=0.3,
+                              by_value=0.3, selects=True)
 WARM_START = ColonyParams(start_temperature=0.3, end_temperature=0.02, reheat_temperature=3.0)
 _ROUND_TIME = 0.005  # [s] of one flight: the clock is read between flights
 FIXED_ROUNDS = 100  # rounds of a flight where iterations are limited
@@ -35,11 +41,19 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
         recorder.offer(repair(problem, {}))
     if not problem.tasks or not problem.uavs or recorder.over():
         return learnt
-    params = params or (WARM_START if recorder.warm else COLD_START)
+    params = params or _params(recorder)
     colonies = [Colony(problem, recorder.best, seed + 7919 * i, params, learnt)
                 for i in range(recorder.threads)]
     run_colonies(colonies, recorder)
     return colonies[0].scouts.learnt()
+
+
+def _params(recorder: Recorder) -> ColonyParams:
+    """Parameters for a warm start, for tasks that must be left out, or for neither."""
+    if recorder.warm:
+        return WARM_START
+    selects = must_leave_tasks(recorder.problem, recorder.best, recorder.budget)
+    return COLD_SELECTION if selects else COLD_START
 
 
 class Flies(Protocol):

@@ -23,6 +23,7 @@ from uav_task_alloc.solver.routes import (
 from uav_task_alloc.solver.ruin import empty_log
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.search import search, trim_to_range
+from uav_task_alloc.solver.selection import out_of_reach
 
 PHASES = (0.0, 0.45, 0.92, 1.0)  # shares of the budget: cooling, second cooling, constant
 WORK = 150.0  # stops of the pool read by `recombine` per round of the whole search
@@ -41,6 +42,9 @@ class ColonyParams:
     onlookers: float = 0.2  # least share
     scouts: float = 0.01  # least share
     range_penalty: float = 5.0  # [m/m] first cost of a metre beyond range
+    skipped: float = 0.0  # probability that a round passes over an unassigned task near its seed
+    by_value: float = 0.0  # share of rounds that insert about the most valuable tasks first
+    selects: bool = False  # tasks have to be left out; no search is spent on those out of reach
     learning: bool = True  # False: Q is frozen
     bidding: bool = True  # False: the shares of the work are fixed
 
@@ -72,6 +76,10 @@ class Colony:
         self._bids = Bidding({kind: floor for kind, floor in floors.items() if floor > 0.0})
         if arrays.hard:
             self.arrays.range_penalty[:] = params.range_penalty
+        self._log.rates[:] = params.skipped, params.by_value
+        if params.selects:
+            self.arrays.unassigned_cost[out_of_reach(problem)] = 0.0
+            update_sums(self.arrays, self.best)
 
     def temperature(self, spent: float) -> float:
         """Temperature [m] after this share of the budget."""

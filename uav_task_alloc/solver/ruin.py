@@ -34,6 +34,9 @@ OVERRANGE_SEED_RATE = 0.2  # share that start at a route beyond range, if there 
 FEW = 0.05  # up to this share of unassigned tasks their cost rises
 COST_GROWTH = 1.3  # by this factor at each update
 BLINK_RATE = 0.01  # share of places skipped
+# entries of RuinLog.rates: probability that a round passes over an unassigned task near its seed;
+# share of rounds that insert about the most valuable tasks first
+SKIPPED, BY_VALUE = range(2)
 
 
 class RuinLog(NamedTuple):
@@ -47,6 +50,7 @@ class RuinLog(NamedTuple):
     last_ruined: Ints  # (m) round in which a route was ruined last
     unassigned: Ints  # task nodes unassigned at the last update
     overrange: Ints  # UAVs with routes beyond range at the last update
+    rates: Floats  # (2) SKIPPED, BY_VALUE
 
 
 def empty_log(a: Arrays) -> RuinLog:
@@ -55,7 +59,7 @@ def empty_log(a: Arrays) -> RuinLog:
     return RuinLog(np.empty(2 * room, NODE), np.empty(2 * room, np.int64),
                    np.empty(room, NODE), np.empty(room), np.zeros(5, np.int64),
                    np.zeros(a.uavs, np.int64), np.empty(room, np.int64),
-                   np.empty(a.uavs, np.int64))
+                   np.empty(a.uavs, np.int64), np.zeros(2))
 
 
 @inline_kernel
@@ -151,7 +155,8 @@ def ruin(a: Arrays, r: Routes, log: RuinLog, mean: float, round_id: int, rng: Rn
         c = seed if m < 0 else a.near[seed - a.uavs, m]
         u = r.uav_of[c]
         if u < 0:
-            if left_out < 10 and not _is_removed(log, c):
+            if left_out < 10 and not _is_removed(log, c) and not (
+                    log.rates[SKIPPED] > 0.0 and _passes_over(a, log, c, m, rng)):
                 log.removed[log.counts[1]] = c
                 log.counts[1] += 1
                 left_out += 1
@@ -160,6 +165,14 @@ def ruin(a: Arrays, r: Routes, log: RuinLog, mean: float, round_id: int, rng: Rn
             strings -= 1
             size = 1 + below(rng, int(min(longest, float(r.tasks[u]))))
             _remove_string(a, r, log, c, size, rng)
+
+
+@inline_kernel
+def _passes_over(a: Arrays, log: RuinLog, c: int, m: int, rng: RngState) -> bool:
+    """Whether an unassigned task is not tried: one out of reach, or by chance. O(1)."""
+    if a.unassigned_cost[c - a.uavs] <= 0.0:
+        return True
+    return m >= 0 and uniform(rng) < log.rates[SKIPPED]
 
 
 @inline_kernel
@@ -175,6 +188,8 @@ def _is_removed(log: RuinLog, t: int) -> bool:
 def _sort_removed(a: Arrays, log: RuinLog, rng: RngState) -> None:
     """Sort removed tasks: at random, furthest, nearest or costliest first. O(removed^2)."""
     kind = below(rng, 8)
+    if log.rates[BY_VALUE] > 0.0 and uniform(rng) < log.rates[BY_VALUE]:
+        kind = 8
     for i in range(log.counts[1]):
         t = log.removed[i]
         key = uniform(rng)
@@ -184,6 +199,8 @@ def _sort_removed(a: Arrays, log: RuinLog, rng: RngState) -> None:
             key = a.start_length[t - a.uavs, 0]
         elif kind == 7:
             key = -a.unassigned_cost[t - a.uavs]
+        elif kind == 8:
+            key = -a.unassigned_cost[t - a.uavs] * (0.5 + key)
         place = i
         while place > 0 and log.order[place - 1] > key:
             log.order[place], log.removed[place] = log.order[place - 1], log.removed[place - 1]
