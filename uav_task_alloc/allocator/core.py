@@ -217,14 +217,15 @@ class Allocator:
         if schedule.settled(now, params.settle):
             trigger = schedule.begin(now)
             if world.fleet.usable_ids() or waiting_uavs(world, stamp):
-                return replan_problem(world, self._best, trigger, background=False, stamp=stamp)
+                return replan_problem(world, self._best, trigger, background=False, stamp=stamp,
+                                      outlook=self.waiting.outlook(stamp))
             self._apply(Plan({}), trigger, True, now, stamp)
             schedule.end(now)
         elif (params.background_budget > 0.0 and schedule.rested(now, params.background_period)
               and world.fleet.usable_ids() and world.tasks.open() and not self.approvals.quiet):
             schedule.begin(now)
             return replan_problem(world, self._best, 'background', background=True,
-                                  stamp=stamp)
+                                  stamp=stamp, outlook=self.waiting.outlook(stamp))
         return None
 
     def _waiting(self, now: float) -> bool:
@@ -248,7 +249,9 @@ class Allocator:
             self._learned_saved = now
             self.world.mark_unsaved('learner')
         accepted = accepted_plan(answer, self.world.params.replan_margin)
-        chosen = replace(holding_plan(self.world, (accepted, answer.repaired), stamp),
+        plans = (accepted, answer.repaired) if answer.covered is None else (
+            answer.covered, accepted, answer.repaired)
+        chosen = replace(holding_plan(self.world, plans, stamp),
                          iterations=answer.best.iterations,
                          solve_time=answer.repaired.solve_time + answer.best.solve_time,
                          warm_started=any(answer.problem.published.routes.values()))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from uav_task_alloc.allocator.order_records import OperatorHold, OrderRows
 from uav_task_alloc.allocator.work_records import WorkRecord
@@ -14,6 +14,10 @@ from uav_task_alloc.checks import check_id, check_names, check_number, check_poi
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 # limits of a UavReport that are None where they are unknown, named as in model.Uav
 REPORTED_LIMITS = ('endurance', 'payload_capacity', 'climb_speed', 'descent_speed', 'full_range',
@@ -277,6 +281,18 @@ class ReplanProblem:
     stamp: float = 0.0  # [s] of the copy, of the published clock
     since: Mapping[str, float] = field(default_factory=dict)  # [s] announcements, by task id
     stop_time: float = 0.0  # [s] that braking and accelerating cost at each task
+    outlook: FleetOutlook | None = None  # None: the next tasks do not count
+
+
+@dataclass(frozen=True, slots=True)
+class FleetOutlook:
+    """Where the next task is expected, at k places, and where UAVs without tasks wait for it."""
+
+    x: NDArray[np.float64]  # (k) [m] east
+    y: NDArray[np.float64]  # (k) [m] north
+    weight: NDArray[np.float64]  # (k) probability of the task, times its value; the sum is 1
+    value: float  # mean value of a task, > 0
+    waiting: Mapping[str, Point]  # [m] ENU by UAV id; of others their positions
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,6 +302,7 @@ class ReplanAnswer:
     problem: ReplanProblem  # that was solved
     repaired: Plan  # the published lists, repaired by insertion
     best: Plan  # the best plan within the budget
+    covered: Plan | None = None  # the plan to publish, where the next tasks count
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from uav_task_alloc.kernel import inner_kernel
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
 _LONGEST = 3600.0  # [s] until the next task is answered where there is no other UAV
 
 
@@ -36,6 +38,9 @@ class Cover(NamedTuple):
     waiting: _Floats  # (m, 2) [m] where idle UAVs wait
     time: _Floats  # (m, k) [s]
     tasks: _Floats  # (1) to come whose expected response time counts
+    least: _Floats  # (3, k) [s] the least times, ascending
+    nearest: _Ints  # (2, k) the UAVs of the first two
+    current: _Bools  # (1) whether these two are those of `time`
     scratch: _Floats  # (3, k)
 
 
@@ -51,29 +56,48 @@ def make_cover(prices: CoverPrices, x: _Floats, y: _Floats, waiting: _Floats) ->
         The cover; its times are not set.
     """
     return Cover(prices, x, y, np.full(len(x), 1.0 / len(x)), waiting,
-                 np.zeros((len(waiting), len(x))), np.zeros(1), np.zeros((3, len(x))))
+                 np.zeros((len(waiting), len(x))), np.zeros(1), np.zeros((3, len(x))),
+                 np.zeros((2, len(x)), np.int64), np.zeros(1, np.bool_), np.zeros((3, len(x))))
 
 
 @inner_kernel
 def set_times(cover: Cover, u: int, free_in: float, x: float, y: float, speed: float) -> None:
     """Set the times of UAV u, which is free at a point [m] after a time [s]. O(k)"""
     _times(cover, free_in, x, y, speed, cover.time[u])
+    cover.current[0] = False
 
 
 @inner_kernel
 def leave_out(cover: Cover, u: int) -> None:
-    """Prepare `expected` and `expected_after` for UAV u: the two least times of others. O(m k)"""
+    """Prepare `expected` and `expected_after` for UAV u: the two least times of others. O(k)"""
+    if not cover.current[0]:
+        _rank(cover)
     first, second = cover.scratch[0], cover.scratch[1]
-    first[:] = _LONGEST
-    second[:] = _LONGEST
+    for c in range(first.size):
+        place = 0 if cover.nearest[0, c] == u else 1 if cover.nearest[1, c] == u else 2
+        first[c] = cover.least[1 if place == 0 else 0, c]
+        second[c] = cover.least[1 if place == 2 else 2, c]
+
+
+@inner_kernel
+def _rank(cover: Cover) -> None:
+    """Set the three least times of each place. O(m k)"""
+    least, nearest = cover.least, cover.nearest
+    least[:] = _LONGEST
+    nearest[:] = -1
     for v in range(cover.time.shape[0]):
-        if v != u:
-            row = cover.time[v]
-            for c in range(row.size):
-                t, a, b = row[c], first[c], second[c]
-                high = a if t < a else t
-                first[c] = t if t < a else a
-                second[c] = high if high < b else b
+        row = cover.time[v]
+        for c in range(row.size):
+            t = row[c]
+            if t < least[0, c]:
+                least[2, c], least[1, c], least[0, c] = least[1, c], least[0, c], t
+                nearest[1, c], nearest[0, c] = nearest[0, c], v
+            elif t < least[1, c]:
+                least[2, c], least[1, c] = least[1, c], t
+                nearest[1, c] = v
+            elif t < least[2, c]:
+                least[2, c] = t
+    cover.current[0] = True
 
 
 @inner_kernel

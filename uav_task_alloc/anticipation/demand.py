@@ -106,10 +106,14 @@ class Demand:
         intensity.density(self.cells, self.estimates, self.model.prior, now, out)
         return out
 
+    @property
+    def mean_value(self) -> float:
+        """The mean value of the tasks so far; 1.0 where none was seen."""
+        return float(np.mean([each.value for each in self.seen])) if self.seen else 1.0
+
     def weight(self, now: float) -> _Floats:
         """The density times the mean value of tasks near each cell; (c,), its sum is 1."""
-        mean = np.mean([each.value for each in self.seen]) if self.seen else 1.0
-        worth = (_VALUE_PRIOR * mean + self._values) / (_VALUE_PRIOR + self._counts)
+        worth = (_VALUE_PRIOR * self.mean_value + self._values) / (_VALUE_PRIOR + self._counts)
         weight = self.density(now) * worth
         total = float(weight.sum())
         return weight / total if total > 0.0 else self.density(now)

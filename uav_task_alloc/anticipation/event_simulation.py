@@ -116,7 +116,7 @@ def _next_service(tasks: Tasks, lists: Lists, fleet: FleetTimes) -> tuple[float,
                 continue
             k = lists.task[u, 0]
             way = math.hypot(tasks.x[k] - lists.x[u], tasks.y[k] - lists.y[u])
-            t = fleet.clock[0] + way / lists.speed
+            t = fleet.clock[0] + way / lists.speed[u]
         if t < at:
             at, uav = t, u
     return at, uav
@@ -138,7 +138,7 @@ def _advance(tasks: Tasks, lists: Lists, fleet: FleetTimes, waiting: Waiting, no
         if lists.length[u] > 0:
             x, y = tasks.x[lists.task[u, 0]], tasks.y[lists.task[u, 0]]
         way = math.hypot(x - lists.x[u], y - lists.y[u])
-        step = min(way, past * lists.speed)
+        step = min(way, past * lists.speed[u])
         if way > 0.0:
             lists.x[u] += (x - lists.x[u]) * step / way
             lists.y[u] += (y - lists.y[u]) * step / way

@@ -15,10 +15,11 @@ from uav_task_alloc.anticipation.cover import (
     leave_out,
     set_times,
 )
-from uav_task_alloc.kernel import inner_kernel
+from uav_task_alloc.kernel import inner_kernel, kernel
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
 _LEAST_GAIN = 1e-6  # [s] of a move, so that rounding cannot move a task to and fro
 _LARGEST_COVER = 60.0  # [s] by which cover is taken to change the order of two insertions
 
@@ -31,6 +32,7 @@ class Tasks(NamedTuple):
     announced: _Floats  # (n) [s]
     service: _Floats  # (n) [s]
     started: _Floats  # (n) [s] start of the service; nan before it
+    value: _Floats  # (n) of each task; a wait counts that often
 
 
 class Lists(NamedTuple):
@@ -41,7 +43,8 @@ class Lists(NamedTuple):
     x: _Floats  # (m) [m] where the UAV is, or will be when its service ends
     y: _Floats  # (m) [m]
     free_in: _Floats  # (m) [s] until the service under way ends; 0.0: none is
-    speed: float  # [m/s]
+    speed: _Floats  # (m) [m/s]
+    allowed: _Bools  # (m, n) whether a task may be in the list of a UAV
     cover: Cover  # what the lists leave for the tasks to come
 
 
@@ -109,7 +112,7 @@ def _cover_uav(tasks: Tasks, lists: Lists, u: int) -> None:
         t, x, y = end_of_list(tasks, lists, u)
         if t <= 0.0:
             x, y = lists.cover.waiting[u, 0], lists.cover.waiting[u, 1]
-        set_times(lists.cover, u, t, x, y, lists.speed)
+        set_times(lists.cover, u, t, x, y, lists.speed[u])
 
 
 @inner_kernel
@@ -131,6 +134,8 @@ def _best_insertion(tasks: Tasks, lists: Lists, task: int) -> tuple[int, int, fl
     uav, at, least, here = -1, -1, math.inf, 0.0
     margin = _LARGEST_COVER * lists.cover.tasks[0]
     for u in range(lists.length.size):
+        if not lists.allowed[u, task]:
+            continue
         now, known = _waits(tasks, lists, u, -1, -1), False
         for i in range(lists.length[u] + 1):
             more = _waits(tasks, lists, u, i, task) - now
@@ -139,7 +144,7 @@ def _best_insertion(tasks: Tasks, lists: Lists, task: int) -> tuple[int, int, fl
                     leave_out(lists.cover, u)
                     here, known = expected(lists.cover, u), True
                 t, x, y = _end_with(tasks, lists, u, i, task)
-                more += expected_after(lists.cover, t, x, y, lists.speed) - here
+                more += expected_after(lists.cover, t, x, y, lists.speed[u]) - here
             if more < least:
                 uav, at, least = u, i, more
     return uav, at, least
@@ -147,14 +152,14 @@ def _best_insertion(tasks: Tasks, lists: Lists, task: int) -> tuple[int, int, fl
 
 @inner_kernel
 def _waits(tasks: Tasks, lists: Lists, u: int, at: int, task: int) -> float:
-    """Sum of the times [s] until the services of UAV u start, with a task at a position. O(n)"""
+    """Sum of value times time [s] until each service of UAV u, with a task at a position. O(n)"""
     t, x, y, total = lists.free_in[u], lists.x[u], lists.y[u], 0.0
     for i in range(lists.length[u] + (task >= 0)):
         k = task
         if task < 0 or i != at:
             k = lists.task[u, i - (task >= 0 and i > at)]
-        t += math.hypot(tasks.x[k] - x, tasks.y[k] - y) / lists.speed
-        total += t
+        t += math.hypot(tasks.x[k] - x, tasks.y[k] - y) / lists.speed[u]
+        total += tasks.value[k] * t
         t += tasks.service[k]
         x, y = tasks.x[k], tasks.y[k]
     return total
@@ -200,6 +205,35 @@ def _end_with(tasks: Tasks, lists: Lists, u: int, at: int,
         k = task
         if task < 0 or i != at:
             k = lists.task[u, i - (task >= 0 and i > at)]
-        t += math.hypot(tasks.x[k] - x, tasks.y[k] - y) / lists.speed + tasks.service[k]
+        t += math.hypot(tasks.x[k] - x, tasks.y[k] - y) / lists.speed[u] + tasks.service[k]
         x, y = tasks.x[k], tasks.y[k]
     return t, x, y
+
+
+@kernel
+def spread_lists(tasks: Tasks, lists: Lists) -> None:
+    """Move single tasks of lists as the simulation does. O(n^3) a pass
+
+    Args:
+        tasks: in the lists.
+        lists: are changed.
+    """
+    improve_lists(tasks, lists)
+
+
+@kernel
+def cover_price(tasks: Tasks, lists: Lists, count: float) -> float:
+    """The expected response times of the next tasks, after all lists.
+
+    Args:
+        tasks: in the lists.
+        lists: of one UAV at least.
+        count: tasks to come that are counted.
+
+    Returns:
+        [s], the sum over these tasks. O(m k)
+    """
+    _set_cover(tasks, lists)
+    lists.cover.tasks[0] = count
+    leave_out(lists.cover, 0)
+    return expected(lists.cover, 0)

@@ -98,12 +98,13 @@ def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrice
     demand = Demand(np.zeros(2), np.full(2, AREA), model=model)
     n, x, y = len(stream.announced), demand.cells.x, demand.cells.y
     tasks = Tasks(stream.place[:, 0].copy(), stream.place[:, 1].copy(), stream.announced,
-                  stream.service, np.full(n, np.nan))
+                  stream.service, np.full(n, np.nan), np.ones(n))
     pairs = demand.cells.across // 2  # places of the cover are the middles of 2 x 2 cells
     middles = [each.reshape(pairs, 2, pairs, 2).mean((1, 3)).ravel().copy() for each in (x, y)]
     known = cover if policy >= events.EVEN else cover._replace(tasks=0.0, least=0.0)
     lists = Lists(np.full((uavs, n + 1), -1), np.zeros(uavs, np.int64), start[:, 0].copy(),
-                  start[:, 1].copy(), np.zeros(uavs), SPEED,
+                  start[:, 1].copy(), np.zeros(uavs), np.full(uavs, SPEED),
+                  np.ones((uavs, n), np.bool_),
                   make_cover(known, middles[0], middles[1], start))
     fleet = FleetTimes(np.full(uavs, np.nan), np.zeros(uavs), np.zeros(uavs), np.zeros(uavs),
                        np.zeros(1))

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from uav_task_alloc.allocator.state.seen_tasks import SeenTask, SeenTasks
 from uav_task_alloc.anticipation.demand import Demand, Observation
 from uav_task_alloc.anticipation.places import MOVE_PRICES, ROUNDS, Waiting, choose_places
+from uav_task_alloc.anticipation.spread import load_spread_kernels
 from uav_task_alloc.kernel_cache import NOTICE, KernelWork
 from uav_task_alloc.params import AllocatorParams
 
 _Floats = NDArray[np.float64]
 _LEAST_SIDE = 400.0  # [m] of an area around tasks
 _STEPS = 8.0  # to which the corners are rounded outwards, of the side rounded up to a power of 2
-_WORK = KernelWork(3.0, 4)
+_WORK = KernelWork(6.0, 40)
 Area = tuple[float, float, float, float]  # west, south, east, north [m] ENU
 
 
@@ -112,3 +113,4 @@ def load_waiting_kernels() -> None:
         assert learnt.demand is not None
         choose_places(learnt.demand.cells, learnt.distance, weight, waiting, MOVE_PRICES, ROUNDS,
                       np.zeros((4, weight.size)))
+        load_spread_kernels()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from uav_task_alloc.allocator.records import ReplanAnswer
+from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.model import Plan
 from uav_task_alloc.objective import response_time
 from uav_task_alloc.timetable import Timetable
@@ -62,8 +62,21 @@ def _cost(answer: ReplanAnswer, changed: Collection[str],
 
     only: UAVs that count; None: all.
     """
-    problem, prices = answer.problem, answer.problem.objective
-    plan = _combined(answer, changed)
+    return plan_cost(answer.problem, _combined(answer, changed), only)
+
+
+def plan_cost(problem: ReplanProblem, plan: Plan, only: Collection[str] | None = None) -> float:
+    """Return the cost of the objective of a plan.
+
+    Args:
+        problem: from now.
+        plan: of the problem.
+        only: ids of the UAVs that count; None: all.
+
+    Returns:
+        The cost, with a penalty for what exceeds ranges.
+    """
+    prices = problem.objective
     uavs = [uav for uav in problem.uavs if only is None or uav.id in only]
     paths = {task.id: task.path_length for task in problem.tasks}
     metres = sum(_length_with_penalty(plan, uav.id, uav.range, paths) for uav in uavs)

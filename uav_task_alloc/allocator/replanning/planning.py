@@ -7,7 +7,13 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from uav_task_alloc.allocator.records import LaterTrips, ReplanAnswer, ReplanProblem, UavList
+from uav_task_alloc.allocator.records import (
+    FleetOutlook,
+    LaterTrips,
+    ReplanAnswer,
+    ReplanProblem,
+    UavList,
+)
 from uav_task_alloc.allocator.replanning.from_now import (
     counts_time,
     from_now,
@@ -52,7 +58,7 @@ class BuiltLists:
 
 
 def replan_problem(world: World, best: Plan, trigger: str, background: bool,
-                   stamp: float = 0.0) -> ReplanProblem:
+                   stamp: float = 0.0, outlook: FleetOutlook | None = None) -> ReplanProblem:
     """Return the problem for the worker; the published lists are the incumbent.
 
     Args:
@@ -61,6 +67,7 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         trigger: what requires the plan.
         background: nothing does; a better plan is sought with `background_budget`.
         stamp: [s] published clock.
+        outlook: where the next tasks are expected; None: that does not count.
 
     Returns:
         A copy, which the worker thread may read while the world changes.
@@ -93,7 +100,7 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
             if stop.reversed and stop.task.id not in under_way)), world),
         warm=replace(best, reversed=best.reversed - under_way.keys()),
         objective=objective, trips=params.trips, stamp=stamp, stop_time=stop_time,
-        since={task.id: records[task.id].since for task in tasks})
+        since={task.id: records[task.id].since for task in tasks}, outlook=outlook)
 
 
 def ways_under_way(world: World) -> dict[str, tuple[Point, ...]]:
@@ -178,7 +185,8 @@ def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: All
         stop: polled; the search ends early when it returns true.
 
     Returns:
-        Both plans; the best is the repaired one where nothing better was found.
+        Both plans; the best is the repaired one where nothing better was found. With an outlook,
+        also the plan to publish.
     """
     problem = from_now(problem)
     repaired = _solved(plan, problem, params, stop, problem.published, 0, problem.tasks)
@@ -187,7 +195,12 @@ def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: All
                    problem.warm if problem.background else repaired, None, tasks)
     if tasks is not problem.tasks:
         best = with_true_values(best, problem.tasks)
-    return ReplanAnswer(problem, repaired, best)
+    answer = ReplanAnswer(problem, repaired, best)
+    if problem.outlook is None or stop():
+        return answer
+    from uav_task_alloc.allocator.replanning.covered_plan import covered_plan  # imports numba
+    return replace(answer, covered=covered_plan(answer, params.replan_margin, lambda warm: _solved(
+        plan, problem, params, stop, warm, 0, problem.tasks)))
 
 
 def repaired_plan(plan: Callable[..., Plan], problem: ReplanProblem, params: AllocatorParams,

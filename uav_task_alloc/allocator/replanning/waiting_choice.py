@@ -5,16 +5,19 @@ Importing this module loads the compiled kernels.
 """
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uav_task_alloc.allocator.records import FleetOutlook, UavList
 from uav_task_alloc.allocator.replanning.demand_area import LearntDemand
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
+from uav_task_alloc.allocator.state.seen_tasks import SeenTasks
 from uav_task_alloc.anticipation.intensity import Cells
 from uav_task_alloc.anticipation.places import MOVE_PRICES, ROUNDS, Waiting, choose_places
 from uav_task_alloc.model import Point
+from uav_task_alloc.params import AllocatorParams
 
 _MOST_IDLE = 12  # UAVs that may move in one choice: a callback ends
 _NEAR = 1.0  # [m] the same place
@@ -60,6 +63,32 @@ class WaitingChoice:
         moved = np.hypot(*(waiting.place - before).T) > _NEAR
         return {uav_id: (float(waiting.place[k, 0]), float(waiting.place[k, 1]), idle[uav_id][0])
                 for k, uav_id in enumerate(ids) if moved[k]}
+
+    def outlook(self, seen: SeenTasks, params: AllocatorParams, lists: Iterable[UavList],
+                stamp: float) -> FleetOutlook | None:
+        """Return where the next task is expected, for plans.
+
+        Args:
+            seen: announcements.
+            params: with `anticipate`, and the area where it is given.
+            lists: in force.
+            stamp: [s] published clock.
+
+        Returns:
+            At the middles of 2 x 2 cells; None while no area is known.
+        """
+        self.demand.follow(seen, params)
+        demand = self.demand.demand
+        if demand is None:
+            return None
+        pairs = demand.cells.across // 2
+        x, y, weight = (each.reshape(pairs, 2, pairs, 2) for each in (
+            demand.cells.x, demand.cells.y,
+            self.demand.weight(params.anticipate == 'learnt', stamp)))
+        return FleetOutlook(
+            x.mean((1, 3)).ravel(), y.mean((1, 3)).ravel(), weight.sum((1, 3)).ravel(),
+            demand.mean_value or 1.0, {each.uav: place for each in lists
+                                       if (place := each.waiting_place) is not None})
 
     def _outside_zones(self, cells: Cells, paths: SafePaths, height: float) -> Cells:
         """The cells, without those whose centres are inside a zone."""

@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from uav_task_alloc.allocator.order_records import OrderKind
-from uav_task_alloc.allocator.records import UavList
-from uav_task_alloc.allocator.replanning.from_now import separation_of
+from uav_task_alloc.allocator.records import FleetOutlook, UavList
+from uav_task_alloc.allocator.replanning.from_now import objective_of, separation_of
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.allocator.state.flight_pace import finish_time
 from uav_task_alloc.allocator.state.world import World
@@ -123,10 +123,23 @@ class WaitingPlaces:
         self._stays = {uav_id: text for uav_id, text in self._stays.items() if uav_id in idle}
         if not idle:
             return {}
+        return self._sent(idle, self._begun(), stamp)
+
+    def outlook(self, stamp: float) -> FleetOutlook | None:
+        """Return where the next tasks are expected, for plans; None: that does not count."""
+        world, params = self._world, self._world.params
+        prices = objective_of(params)
+        if not self.on or params.route_end == 'home' or not (
+                prices.response > 0.0 and prices.finish == 0.0):
+            return None
+        return self._begun().outlook(world.announced.seen, params,
+                                     world.lists_in_force().values(), stamp)
+
+    def _begun(self) -> WaitingChoice:
         if self._choice is None:
             from uav_task_alloc.allocator.replanning.waiting_choice import WaitingChoice
             self._choice = WaitingChoice()
-        return self._sent(idle, self._choice, stamp)
+        return self._choice
 
     def _sent(self, idle: list[str], choice: WaitingChoice, stamp: float) -> dict[str, UavList]:
         """The lists of the UAVs that change their places."""
