@@ -41,7 +41,7 @@ from uav_task_alloc.separation.monitor import SeparationHold
 from uav_task_alloc.solver import solve
 
 SIDE, HEIGHT = 10_000.0, 60.0  # [m] of the area; of tasks
-SPEED, CLIMB, STEP = 15.0, 3.0, 1.0  # [m/s], [m/s], [s]
+SPEED, CLIMB = 15.0, 3.0  # [m/s]
 SPOTS, SPREAD, BACKGROUND = 3, 800.0, 0.1  # hot spots, [m], share of uniform tasks
 SERVICE = 30.0, 90.0  # [s] shortest and longest
 FULL, TURNAROUND = 40_000.0, 120.0  # [m] of a battery, hovering uses as much; [s] of a change
@@ -53,8 +53,8 @@ FIRST_SEED = 9000  # of the runs that are reported; others were flown while this
 class Flight:
     """One UAV: flies its list, holds, and changes its battery at its base."""
 
-    def __init__(self, name: str, base: Point) -> None:
-        self.name, self.base, self.place = name, base, base
+    def __init__(self, name: str, base: Point, step: float) -> None:
+        self.name, self.base, self.place, self.step = name, base, base, step
         self.list, self.passed = UavList(name, 0), 0  # and points passed on the leg under way
         self.in_air, self.battery = False, FULL  # [m] left
         self.busy_until = self.ready_at = 0.0  # [s] end of the service, and of a battery change
@@ -85,17 +85,17 @@ class Flight:
             standby=not self.in_air, authority='HELD', takeoff_height=HEIGHT)
 
     def fly(self, now: float) -> list[TaskEvent]:
-        """Fly for one STEP; returns the events of tasks."""
+        """Fly for one step; returns the events of tasks."""
         if not self.in_air:
             if self.ready_at and now >= self.ready_at:
                 self.battery, self.ready_at = FULL, 0.0
             if not self.list.stops or self.ready_at:
                 return []
             self.in_air = True
-        self.battery = max(0.0, self.battery - SPEED * STEP)
+        self.battery = max(0.0, self.battery - SPEED * self.step)
         stop = self.list.stops[0] if self.list.stops else None
         if stop is not None:
-            self.busy += STEP
+            self.busy += self.step
         if now < self.hold_until:
             return []
         if stop is None:
@@ -126,7 +126,7 @@ class Flight:
 
     def _along(self, line: tuple[Point, ...]) -> bool:
         """Fly on along points; whether it is at their end."""
-        left = SPEED * STEP
+        left = SPEED * self.step
         while self.passed < len(line) and left > 0.0:
             goal = line[self.passed]
             far = math.dist(self.place, goal)
@@ -157,7 +157,7 @@ class Run:
         self.core.set_kernels_ready()
         self.world = self.core.world
         self.fleet = {f'uav_{k}': Flight(f'uav_{k}', (
-            SIDE / 2.0 + 60.0 * (k - args.uavs / 2.0), SIDE / 2.0, 0.0))
+            SIDE / 2.0 + 60.0 * (k - args.uavs / 2.0), SIDE / 2.0, 0.0), args.step)
             for k in range(args.uavs)}
         count = int(rng.poisson(args.rate * 60.0 * args.minutes))
         self.announced = np.sort(rng.uniform(0.0, 60.0 * args.minutes, count))
@@ -186,7 +186,7 @@ class Run:
                 self._fly(each, now)
             self._watch()
             self._allocate(now)
-            now += STEP
+            now += self.args.step
         self.persistence.close()
         response = [self.began[task.id] - at for task, at in zip(
             self.tasks, self.announced, strict=True) if task.id in self.began]
@@ -275,6 +275,7 @@ def main(log: Callable[[str], object] = print) -> int:
     parser.add_argument('--kind', choices=('hot', 'uniform'), default='hot')
     parser.add_argument('--locked', type=int, default=0, help='parameter locked_tasks')
     parser.add_argument('--separation', type=float, default=30.0, help='[m]; 0: off')
+    parser.add_argument('--step', type=float, default=1.0, help='[s] of the simulation')
     parser.add_argument('--anticipate', choices=('even', 'learnt'), default='learnt')
     parser.add_argument('--json', action='store_true', help='the last line alone')
     args = parser.parse_args()
