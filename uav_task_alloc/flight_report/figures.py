@@ -13,6 +13,7 @@ from plotly.subplots import make_subplots
 from uav_task_alloc.flight_report.flight_history import FlightHistory
 from uav_task_alloc.flight_report.strips_figure import add_pieces
 from uav_task_alloc.flight_report.times_figure import services_figure
+from uav_task_alloc.flight_report.waiting import demand_figure
 from uav_task_alloc.geometry.zones import outline
 from uav_task_alloc.model import Point, Shape, ThreatZone
 from uav_task_alloc.palette import DARK_RED, RED, STATE_COLOURS, rgb, uav_colour
@@ -275,6 +276,10 @@ def all_figures(history: FlightHistory) -> Iterable[tuple[str, str, Any]]:
         figure, height = services
         yield ('services', 'Services: planned, flown and windows',
                _with_layout(_with_mission(figure, history), min(_MAX_HEIGHT, height)))
+    demand = demand_figure(history)
+    if demand is not None:
+        figure, height = demand
+        yield 'demand', 'Demand: tasks announced, and waiting places', _with_layout(figure, height)
     yield 'levels', 'Height and battery', level_figure(history)
     yield 'solving', 'Plans: solve time and fit', solve_figure(history)
     yield 'gaps', 'Gaps: UAVs not received', reception_figure(history)

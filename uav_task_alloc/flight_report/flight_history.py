@@ -79,6 +79,8 @@ class FlightHistory:
     values: dict[str, float] = field(default_factory=dict)
     strip_widths: dict[str, float] = field(default_factory=dict)  # [m] of areas
     listed: dict[str, list[str]] = field(default_factory=dict)  # UAVs in whose lists a piece was
+    # [unix s], and place [m] from then on; None: no longer; by UAV that was sent to wait
+    waits: dict[str, list[tuple[float, Point | None]]] = field(default_factory=dict)
     spans: dict[str, list[StateSpan]] = field(default_factory=dict)
     replans: list[ReplanRecord] = field(default_factory=list)
     gaps: list[ReceptionGap] = field(default_factory=list)
@@ -133,6 +135,10 @@ class FlightHistory:
     def on_list(self, line: Line) -> None:
         """Record the leg to a task that has become the next, from the position of the UAV."""
         uav, tasks = line['uav'], line['tasks']
+        waits = line.get('waits')
+        if waits or uav in self.waits:
+            self.waits.setdefault(uav, []).append(
+                (line['wall'], tuple(waits[-1]) if waits else None))
         for row in tasks:
             if None not in row.get('position', (None,)):
                 self.positions[row['id']] = tuple(row['position'])

@@ -16,6 +16,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.flight_report.figures import all_figures
 from uav_task_alloc.flight_report.flight_history import FlightHistory, StateSpan, read_history
 from uav_task_alloc.flight_report.strips import covered_shares, piece_rows
+from uav_task_alloc.flight_report.waiting import waiting_figures, waiting_rows
 from uav_task_alloc.geometry.frames import to_geodetic
 from uav_task_alloc.record.bag_reader import BagReader
 
@@ -154,6 +155,7 @@ def key_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
         ('tasks', len(history.tasks())),
         *((f'tasks {state.lower()}', count) for state, count in sorted(counts.items())),
         *_strip_figures(history),
+        *waiting_figures(history),
         ('UAVs', len(history.tracks)), ('UAVs lost', len(history.lost())),
         ('metres flown', round(flown)),
         ('metres planned, of the legs that were begun', round(planned)),
@@ -179,6 +181,7 @@ def tables(history: FlightHistory) -> str:
                              'ended [s]', 'reason'),
                    (_task_row(history, task) for task in history.tasks())),
         _strips_table(history),
+        _waiting_table(history),
         html_table('UAVs', ('UAV', 'tasks completed', 'metres flown', 'metres planned', 'battery',
                             'last mode', 'done at [s]', 'silent [s]', 'lost at [s]',
                             'last position'),
@@ -204,6 +207,13 @@ def _strips_table(history: FlightHistory) -> str:
                                  'flown', 'interrupted'), (
         (row.piece, row.state.lower(), ', '.join(row.planned), row.flown_by, round(row.metres),
          _percent(row.share), row.interrupted) for row in rows)) if rows else ''
+
+
+def _waiting_table(history: FlightHistory) -> str:
+    """The table of waiting; nothing where no UAV was sent to a place."""
+    rows = waiting_rows(history)
+    return html_table('Waiting', ('UAV', 'moves to waiting places', 'metres flown for waiting'), (
+        (row.uav, row.moves, round(row.metres)) for row in rows)) if rows else ''
 
 
 def _percent(share: float | None) -> str:
