@@ -109,6 +109,24 @@ def test_a_place_is_kept_while_nothing_changes():
     assert len(fleet.driver.history) == sent
 
 
+@pytest.mark.parametrize('background', [0.0, 0.02])
+def test_a_place_is_kept_while_plans_follow_for_others(background):
+    fleet = IdleFleet((0.0, 0.0, 50.0), (-3000.0, -3000.0, 50.0), background_budget=background,
+                      anticipate_area=AREA)
+    fleet.wait()
+    assert near(fleet.place())
+    sent = len(fleet.driver.history)
+    fleet.driver.add(('t1', -9000.0, -9100.0))
+    for _ in range(30):
+        fleet.driver.now += 1.0
+        fleet.report()
+        fleet.driver.world.request_replan('test', fleet.driver.now)
+        fleet.driver.settle(report=False)
+        assert near(fleet.place())
+    assert fleet.driver.route('u1') == ('t1',)
+    assert sum(each.uav == 'u0' for each in fleet.driver.history[sent:]) <= 1
+
+
 @pytest.mark.parametrize('more', [
     {'authority': 'SUSPENDED'}, {'authority': 'LOST'}, {'authority': 'NONE'}, {'authority': ''},
     {'mode': 'STANDBY', 'standby': True}, {'mode': 'RETURNING'}, {'mode': 'TAKEOFF'},

@@ -228,8 +228,8 @@ def _solved(plan: Callable[..., Plan], problem: ReplanProblem, params: Allocator
 def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
     """Build the lists of a plan for the world as it is now; the world is not changed.
 
-    A list that is still valid is kept. UAVs that the plan does not use get an empty list, but
-    not while tasks are held after a restart.
+    A list that is still valid is kept, also one to a waiting place of a UAV without tasks. UAVs
+    that the plan does not use get an empty list, but not while tasks are held after a restart.
 
     Args:
         world: as it is now.
@@ -248,7 +248,8 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
     for uav_id, task_ids in _present_routes(world, chosen).items():
         tasks = [world.task_records()[task_id].task for task_id in task_ids]
         home = returns or uav_id in built.later
-        if world.is_current(uav_id, tasks, home, backward):
+        waits = not (tasks or home) and way_to_place_is_clear(world, world.list_of(uav_id))
+        if waits or world.is_current(uav_id, tasks, home, backward):
             built.lists[uav_id] = world.list_of(uav_id)
             continue
         unreachable = _build(world, built, uav_id, tasks, home, legs, stamp, backward)
@@ -261,6 +262,21 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
         if uav_id not in built.lists and not world.restart_hold:
             _build_empty(world, built, uav_id)
     return built
+
+
+def way_to_place_is_clear(world: World, each: UavList) -> bool:
+    """Return whether a list leads to a waiting place, and nothing is in the way.
+
+    Args:
+        world: as it is now.
+        each: the list in force of a UAV.
+
+    Returns:
+        False also where the UAV is not known.
+    """
+    record, place = world.uav_record(each.uav), each.waiting_place
+    return record is not None and place is not None and world.paths().rest_of_leg(
+        record.report.position, Leg(each.end_via[:-1], 0.0), place) is not None
 
 
 def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], returns: bool,

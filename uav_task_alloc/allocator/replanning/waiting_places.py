@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 from uav_task_alloc.allocator.order_records import OrderKind
 from uav_task_alloc.allocator.records import FleetOutlook, UavList
 from uav_task_alloc.allocator.replanning.from_now import objective_of, separation_of
+from uav_task_alloc.allocator.replanning.planning import way_to_place_is_clear
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.allocator.state.flight_pace import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import polyline_length
-from uav_task_alloc.model import Leg, Point
+from uav_task_alloc.model import Point
 from uav_task_alloc.params import BridgeParams
 
 if TYPE_CHECKING:
@@ -82,11 +83,9 @@ class WaitingPlaces:
         if record is None or not self._world.kernels_ready:
             return ''  # after a restart: it has not reported yet
         why = self._why_not_idle(each.uav, record)
-        if why or each.waiting_place is None:
+        if why or way_to_place_is_clear(self._world, each):
             return why
-        rest = self._world.paths().rest_of_leg(record.report.position, Leg(each.end_via[:-1], 0.0),
-                                        each.waiting_place)
-        return 'a zone is on its way' if rest is None else ''
+        return 'a zone is on its way'
 
     def _why_not_idle(self, uav_id: str, record: UavRecord) -> str:
         """Why a UAV may not be sent to a place; '': it may."""
