@@ -2,6 +2,7 @@
 """Files as other programs write them, also broken ones: imported, or refused with the reason."""
 import io
 import json
+import math
 import zipfile
 
 import pytest
@@ -29,12 +30,16 @@ PATH = ('<Placemark><name>Path</name><LineString><altitudeMode>{}</altitudeMode>
         + TEXT + '</coordinates></LineString></Placemark>')
 PIN = ('<Placemark><name>Pin</name><LookAt><longitude>8.5</longitude></LookAt><Point>'
        '<gx:drawOrder>1</gx:drawOrder><coordinates>{}</coordinates></Point></Placemark>')
-WAYLINE = """<?xml version="1.0" encoding="UTF-8"?>
+TEMPLATE = """<?xml version="1.0" encoding="UTF-8"?>
 <kml xmlns="http://www.opengis.net/kml/2.2" xmlns:wpml="http://www.dji.com/wpmz/1.0.2"><Document>
 <wpml:missionConfig><wpml:flyToWaylineMode>safely</wpml:flyToWaylineMode></wpml:missionConfig>
-<Folder><wpml:templateId>0</wpml:templateId><wpml:executeHeightMode>MODE</wpml:executeHeightMode>
+<Folder><wpml:templateType>waypoint</wpml:templateType><wpml:templateId>0</wpml:templateId>
+<wpml:waylineCoordinateSysParam><wpml:coordinateMode>WGS84</wpml:coordinateMode>
+<wpml:heightMode>{}</wpml:heightMode></wpml:waylineCoordinateSysParam>
+<wpml:globalHeight>90</wpml:globalHeight>
 <Placemark><Point><coordinates>8.547,47.400</coordinates></Point><wpml:index>0</wpml:index>
-<wpml:executeHeight>75</wpml:executeHeight><wpml:waypointSpeed>5</wpml:waypointSpeed></Placemark>
+<wpml:ellipsoidHeight>610</wpml:ellipsoidHeight><wpml:height>{}</wpml:height>
+<wpml:useGlobalHeight>{}</wpml:useGlobalHeight></Placemark>
 </Folder></Document></kml>"""
 LITCHI = ('latitude,longitude,altitude(m),heading(deg),curvesize(m),rotationdir,gimbalmode,'
           'gimbalpitchangle,actiontype1,actionparam1,altitudemode,speed(m/s),poi_latitude\n'
@@ -82,10 +87,14 @@ READ = {
         ',30', ',530'), ['LINE 42']),
     'DJI Pilot, above the start': ('a.kml', EARTH.format(PATH.format('relativeToGround')),
                                    ['LINE 30']),
-    'DJI Pilot 2 wayline': ('a.kmz', kmz('wpmz/template.kml', WAYLINE.replace(
-        'MODE', 'relativeToStartPoint').replace('executeHeight>', 'height>').replace(
-            '<wpml:executeHeightMode>relativeToStartPoint</wpml:executeHeightMode>', '')),
-        ['POINT 75']),
+    'DJI Pilot 2, above the start': ('a.kmz', kmz('wpmz/template.kml', TEMPLATE.format(
+        'relativeToStartPoint', 75, 0)), ['POINT 75']),
+    'DJI Pilot 2, above mean sea level': ('a.kmz', kmz('wpmz/template.kml', TEMPLATE.format(
+        'EGM96', 588, 0)), ['POINT 100']),
+    'DJI Pilot 2, above ground': ('a.kmz', kmz('wpmz/template.kml', TEMPLATE.format(
+        'aboveGroundLevel', 60, 0)), ['POINT 60 terrain']),
+    'DJI Pilot 2, one height for all': ('a.kmz', kmz('wpmz/template.kml', TEMPLATE.format(
+        'relativeToStartPoint', 75, 1)), ['POINT 90']),
     'Google My Maps, CDATA': ('a.kml', EARTH.format(PIN.format('8.547,47.4,0').replace(
         '<LookAt>', '<description><![CDATA[value: 3<br>latest: 900]]></description><LookAt>')),
         ['POINT 50']),
@@ -141,10 +150,11 @@ REFUSED = {
     'KML of a track only': ('a.kml', EARTH.format(
         '<Placemark><name>t</name><gx:Track/></Placemark>'), "'t': <Track> is no point"),
     'KMZ that is no archive': ('a.kmz', b'PK\x03\x04 nothing', 'expected a KMZ archive'),
-    'DJI Pilot 2, above the ellipsoid': ('a.kmz', kmz('wpmz/template.kml', WAYLINE.replace(
-        '<wpml:executeHeight>', '<wpml:heightMode>WGS84</wpml:heightMode><wpml:executeHeight>')),
-        'Placemark 1: height mode WGS84: expected relativeToStartPoint'),
-    'DJI Pilot 2 without KML': ('a.kmz', kmz('wpmz/waylines.wpml', WAYLINE), 'no .kml in the'),
+    'DJI Pilot 2, above the ellipsoid': ('a.kmz', kmz('wpmz/template.kml', TEMPLATE.format(
+        'WGS84', 75, 0)), 'Placemark 1: height mode WGS84: expected relativeToStartPoint'),
+    'DJI Pilot 2 without a mode': ('a.kmz', kmz('wpmz/template.kml', TEMPLATE.format('', 75, 0)),
+                                   'Placemark 1: height mode unknown'),
+    'DJI Pilot 2 without KML': ('a.kmz', kmz('wpmz/waylines.wpml', TEMPLATE), 'no .kml in the'),
     'GeoJSON in metres': ('a.geojson', json.dumps({
         'type': 'FeatureCollection', 'features': [], 'crs': {'type': 'name', 'properties': {
             'name': 'urn:ogc:def:crs:EPSG::25832'}}}), 'export it as EPSG:4326'),
@@ -172,6 +182,23 @@ REFUSED = {
     'Litchi with an unknown mode': ('a.csv', LITCHI.format(7, 0), "a.csv:2: altitudemode = '7'"),
     'Litchi in feet': ('a.csv', LITCHI.format(0, 0).replace('altitude(m)', 'altitude(ft)'),
                        r'altitude\(ft\): expected metres'),
+    'GeoJSON with a number without end': ('a.geojson', feature(
+        'Point', [10**400, 47.4]), 'feature 1: coordinates'),
+    'GeoJSON with a number of thousands of digits': (
+        'a.geojson', '{"type": "Point", "coordinates": [8, ' + '9' * 5000 + ']}', 'of digits'),
+    'GeoJSON with an altitude without end': ('a.geojson', feature(
+        'Point', [8.547, 47.4], altitude=10**400), 'altitude = 10{9}'),
+    'QGroundControl, home without end': ('a.plan', qgc(simple()).replace('488.0', '1' + '0' * 400),
+                                         'a.plan: OverflowError'),
+    'QGroundControl, layers without end': ('a.plan', qgc({
+        'type': 'ComplexItem', 'complexItemType': 'StructureScan', 'Layers': math.inf,
+        'ScanBottomAlt': 0, 'polygon': SQUARE, 'CameraCalc': CAMERA}), 'OverflowError'),
+    'QGroundControl, corridor of 300 km': ('a.plan', qgc({
+        'type': 'ComplexItem', 'complexItemType': 'CorridorScan', 'CorridorWidth': 3e5,
+        'polyline': SQUARE[:3], 'TransectStyleComplexItem': {'CameraCalc': CAMERA}}),
+        'item 1: CorridorWidth = 300000.0: expected at most 1000 passes of 40 m'),
+    'CSV with a quotation mark in its head': ('a.csv', '"a"b,lat,lon\n1,2,3\n',
+                                              'a.csv:1: .*expected CSV'),
     'CSV without places': ('a.csv', 'name,height\nm1,5\n', 'expected one named latitude'),
     'a shapefile': ('a.shp', b'\x00\x00\x27\x0a', 'expected a name that ends with .kml'),
     'an empty file': ('a.geojson', '', 'a.geojson:1: .*expected JSON'),

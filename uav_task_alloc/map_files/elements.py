@@ -67,7 +67,7 @@ def check_place(where: str, numbers: Sequence[Any]) -> Place:
     """
     try:
         values = [float(value) for value in numbers if not isinstance(value, bool)]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         values = []
     if len(values) < 2 or len(values) != len(numbers) or not all(map(math.isfinite, values)):
         raise MapFileError(f'{where}: coordinates {shown(list(numbers))}: expected longitude, '

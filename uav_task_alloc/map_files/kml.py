@@ -8,7 +8,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from uav_task_alloc.map_files.elements import (
@@ -74,8 +74,8 @@ def read_kml(data: bytes, file: str) -> MapFile:
     if _tag(root) not in ('kml', 'Document', 'Folder', 'Placemark'):
         raise MapFileError(f'{file}: the document is <{_tag(root)}>: expected <kml>')
     read = MapFile()
-    for number, (node, folders) in enumerate(_placemarks(root, (), file, read), 1):
-        _read_placemark(node, folders, number, file, read)
+    for number, (node, within) in enumerate(_placemarks(root, file, read), 1):
+        _read_placemark(node, within, number, file, read)
     return read
 
 
@@ -92,28 +92,43 @@ def _text(node: ElementTree.Element, tag: str) -> str:
     return '' if child is None else ''.join(child.itertext()).strip()
 
 
-def _placemarks(root: ElementTree.Element, names: tuple[str, ...], file: str, read: MapFile
-                ) -> Iterator[tuple[ElementTree.Element, tuple[str, ...]]]:
-    """Placemarks in the order of the file, each with the names of its folders."""
-    open_nodes = [(root, names)]
+class _Within(NamedTuple):
+    """What the folders around a placemark say of it."""
+
+    zone: bool = False  # one of them is called so
+    mode: str = ''  # what heights of DJI Pilot 2 refer to
+    height: str = ''  # [m] of its waypoints that have none of their own
+
+
+def _within(folder: ElementTree.Element, outer: _Within) -> _Within:
+    system = _child(folder, 'waylineCoordinateSysParam')
+    mode = _text(folder, 'executeHeightMode') or (
+        '' if system is None else _text(system, 'heightMode'))
+    return _Within(outer.zone or bool(_ZONES.search(_text(folder, 'name'))), mode or outer.mode,
+                   _text(folder, 'globalHeight') or outer.height)
+
+
+def _placemarks(root: ElementTree.Element, file: str, read: MapFile
+                ) -> Iterator[tuple[ElementTree.Element, _Within]]:
+    """Placemarks in the order of the file, each with what its folders say."""
+    open_nodes = [(root, _Within())]
     while open_nodes:
-        node, folders = open_nodes.pop()
+        node, outer = open_nodes.pop()
         tag = _tag(node)
         if tag == 'Placemark':
-            yield node, folders
+            yield node, outer
         elif tag in _CONTAINERS:
-            within = (*folders, _text(node, 'name')) if tag == 'Folder' else folders
+            within = _within(node, outer) if tag == 'Folder' else outer
             open_nodes += [(child, within) for child in reversed(node)]
         elif tag in _NOT_READ:
             read.left_out.append(f'{named(file, tag, _text(node, "name"), 1)}: {_NOT_READ[tag]}')
 
 
-def _read_placemark(node: ElementTree.Element, folders: tuple[str, ...], number: int, file: str,
+def _read_placemark(node: ElementTree.Element, within: _Within, number: int, file: str,
                     read: MapFile) -> None:
     name = _text(node, 'name')
     where = named(file, 'Placemark', name, number)
-    zone = any(_ZONES.search(folder) for folder in folders)
-    data, before = {**_data(node), **_pilot_height(node, where)}, len(read.elements)
+    data, before = {**_data(node), **_pilot_height(node, within, where)}, len(read.elements)
     open_nodes = list(reversed(node))
     while open_nodes:
         shape = open_nodes.pop()
@@ -127,14 +142,17 @@ def _read_placemark(node: ElementTree.Element, folders: tuple[str, ...], number:
         elif tag in ('Point', 'LineString', 'LinearRing', 'Polygon'):
             geometry, places, holes = _shape(shape, tag, where)
             read.elements.append(Element(where, name, geometry, places, _reference(shape), data,
-                                         holes=holes, zone=zone))
+                                         holes=holes, zone=within.zone))
     if len(read.elements) == before and not (read.left_out
                                              and read.left_out[-1].startswith(where)):
         read.left_out.append(f'{where}: it has no geometry')
 
 
-def _pilot_height(node: ElementTree.Element, where: str) -> dict[str, Any]:
+def _pilot_height(node: ElementTree.Element, within: _Within, where: str) -> dict[str, Any]:
     """The height of a waypoint of DJI Pilot 2 (WPML), which is no part of its coordinates.
+
+    What heights refer to is said by the folder, see
+    https://developer.dji.com/doc/cloud-api-tutorial/en/api-reference/dji-wpml/template-kml.html
 
     Raises:
         MapFileError: it is above the ellipsoid, or the file does not say above what.
@@ -142,17 +160,19 @@ def _pilot_height(node: ElementTree.Element, where: str) -> dict[str, Any]:
     if '/wpmz/' not in str(node.tag) and not any('/wpmz/' in str(child.tag) for child in node):
         return {}
     height = _text(node, 'executeHeight') or _text(node, 'height')
+    if _text(node, 'useGlobalHeight') == '1':
+        height = within.height or height
     if not height:
         return {}
-    mode = _text(node, 'executeHeightMode') or _text(node, 'heightMode')
-    if mode in ('', 'relativeToStartPoint'):
+    mode = _text(node, 'executeHeightMode') or _text(node, 'heightMode') or within.mode
+    if mode == 'relativeToStartPoint':
         return {'altitude': height}
     if mode == 'EGM96':
         return {'altitude_amsl': height}
     if mode in ('aboveGroundLevel', 'realTimeFollowSurface'):
         return {'altitude': height, 'vertical': 'terrain'}
-    raise MapFileError(f'{where}: height mode {mode}: expected relativeToStartPoint, EGM96 or '
-                       'aboveGroundLevel')
+    raise MapFileError(f'{where}: height mode {mode or "unknown"}: expected relativeToStartPoint, '
+                       'EGM96 or aboveGroundLevel in its folder')
 
 
 def _shape(node: ElementTree.Element, tag: str, where: str) -> tuple[

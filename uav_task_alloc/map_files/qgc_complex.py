@@ -27,7 +27,7 @@ from uav_task_alloc.map_files.elements import (
 ALTITUDE_MODES = {1: ABOVE_ORIGIN, 2: AMSL}
 ABOVE_TERRAIN = 3, 4  # calculated from terrain data, or by the frame
 _DEGREE = 111_319.5  # [m] of latitude
-_MOST_LAYERS = 100  # of a structure scan
+_MOST_LAYERS, _MOST_PASSES = 100, 1000  # of a structure scan; of a corridor
 
 
 def read_complex_item(item: dict[str, Any], where: str, read: MapFile) -> None:
@@ -69,6 +69,9 @@ def read_complex_item(item: dict[str, Any], where: str, read: MapFile) -> None:
         return
     line = _places(item['polyline'], height, where)
     passes = max(1, math.ceil(float(item.get('CorridorWidth') or 0.0) / side - 1e-9))
+    if passes > _MOST_PASSES:
+        raise MapFileError(f'{where}: CorridorWidth = {shown(item["CorridorWidth"])}: expected at '
+                           f'most {_MOST_PASSES} passes of {side:g} m')
     for k in range(passes):
         shifted = _beside(line, (k - (passes - 1) / 2) * side)
         own = own_values(where, item)

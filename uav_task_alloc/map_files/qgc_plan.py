@@ -53,7 +53,7 @@ def read_plan(document: Any, file: str) -> MapFile:
             _read_circle(circle, f'{file}: fence circle {number}', number, read)
         for number, polygon in enumerate(fence.get('polygons', ()), 1):
             _read_polygon(polygon, f'{file}: fence polygon {number}', number, read)
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, LookupError, TypeError, ValueError, OverflowError) as error:
         if isinstance(error, AllocError):
             raise
         raise MapFileError(f'{file}: {type(error).__name__}: {error}: expected a .plan file of '

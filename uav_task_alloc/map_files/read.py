@@ -49,10 +49,13 @@ def _text(data: bytes, file: str) -> str:
 
 
 def _json(data: bytes, file: str) -> Any:
+    text = _text(data, file)
     try:
-        return json.loads(_text(data, file))
+        return json.loads(text)
     except json.JSONDecodeError as error:
         raise MapFileError(f'{file}:{error.lineno}: {error.msg}: expected JSON') from None
+    except ValueError:
+        raise MapFileError(f'{file}: a number of thousands of digits: expected a map') from None
     except RecursionError:
         raise MapFileError(f'{file}: nested too deep: expected a map') from None
 

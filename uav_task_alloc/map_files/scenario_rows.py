@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -44,6 +43,7 @@ _HINTED = {'value', 'service_time', 'latest'}  # keys for which a hint names oth
 _RESULTS = 'route', 'track'  # written by map_files.write
 _ROW = re.compile(r':\d+: (scenario\.(tasks|zones|uavs)\[(\d+)\].*)', re.DOTALL)
 _ONE_PLACE = {'latitude': 2e-7, 'longitude': 2e-7, 'altitude': 0.02}  # [deg], [m]
+_HIGHEST = 1e6  # [m] of an altitude
 _SHIFT = 5.0 / 111_000.0  # [deg] of latitude: UAVs without a place start 5 m apart
 
 
@@ -239,7 +239,7 @@ class _Rows:
         if own:
             key, given = next(iter(own.items()))
             number = _number(given)
-            if not isinstance(number, (int, float)) or not math.isfinite(number):
+            if not isinstance(number, (int, float)) or not abs(number) <= _HIGHEST:
                 raise MapFileError(f'{element.where}: {key} = {given!r}: expected a number [m]')
             return self._above_origin(number, AMSL if key == 'altitude_amsl' else ABOVE_ORIGIN)
         if place.altitude is None or not element.reference:

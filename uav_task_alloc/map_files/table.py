@@ -37,6 +37,13 @@ def read_table(text: str, file: str) -> MapFile:
     lines = text.splitlines()
     head = next((line for line in lines if line.strip()), '')
     reader = csv.DictReader(lines, delimiter=max(',;\t', key=head.count), strict=True)
+    try:
+        return _read_rows(reader, file)
+    except csv.Error as error:
+        raise MapFileError(f'{file}:{max(1, reader.line_num)}: {error}: expected CSV') from None
+
+
+def _read_rows(reader: csv.DictReader[str], file: str) -> MapFile:
     names = [str(name).strip().lower() for name in reader.fieldnames or ()]
     reader.fieldnames = names
     latitude, longitude = (_column(names, wanted, file) for wanted in (_LATITUDE, _LONGITUDE))
@@ -48,22 +55,19 @@ def read_table(text: str, file: str) -> MapFile:
     unsaid = _ALTITUDES.get(_quantity(altitude), UNSAID)
     label = next((name for name in _NAMES if name in names), '')
     read = MapFile()
-    try:
-        for row in reader:
-            where = f'{file}:{reader.line_num}'
-            if None in row or None in row.values():
-                raise MapFileError(f'{where}: expected {len(names)} columns: {", ".join(names)}')
-            mode = _mode(row.get(_MODE), where)
-            numbers = [row[longitude], row[latitude]] + (
-                [row[altitude]] if altitude and row[altitude].strip() else [])
-            read.elements.append(Element(
-                where, row[label].strip() if label else '', 'point',
-                (check_place(where, numbers),), ABOVE_ORIGIN if mode else unsaid,
-                {**{name: value.strip() for name, value in row.items()
-                    if value.strip() and name not in (latitude, longitude, altitude, label)},
-                 **({'vertical': 'terrain'} if mode == _ABOVE_GROUND else {})}))
-    except csv.Error as error:
-        raise MapFileError(f'{file}:{reader.line_num}: {error}: expected CSV') from None
+    for row in reader:
+        where = f'{file}:{reader.line_num}'
+        if None in row or None in row.values():
+            raise MapFileError(f'{where}: expected {len(names)} columns: {", ".join(names)}')
+        mode = _mode(row.get(_MODE), where)
+        numbers = [row[longitude], row[latitude]] + (
+            [row[altitude]] if altitude and row[altitude].strip() else [])
+        read.elements.append(Element(
+            where, row[label].strip() if label else '', 'point',
+            (check_place(where, numbers),), ABOVE_ORIGIN if mode else unsaid,
+            {**{name: value.strip() for name, value in row.items()
+                if value.strip() and name not in (latitude, longitude, altitude, label)},
+             **({'vertical': 'terrain'} if mode == _ABOVE_GROUND else {})}))
     return read
 
 
