@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command of the demo up to the start of its nodes, and its end; `make demo` flies it."""
+import contextlib
 import os
 import signal
 import subprocess
@@ -10,6 +11,7 @@ from types import SimpleNamespace
 import pytest
 from ament_index_python.packages import get_package_prefix
 
+from uav_task_alloc import scenario
 from uav_task_alloc.nodes import demo
 
 pytestmark = pytest.mark.ros
@@ -53,6 +55,22 @@ def test_finding_34_the_results_of_the_last_demo_are_removed(tmp_path, no_nodes)
             demo.main(['--out', str(out)])
         assert not (out / 'summary.json').exists()
         (out / 'summary.json').write_text('{}')
+
+
+def test_a_signal_whose_exception_is_lost_in_a_library_ends_the_demo(
+        tmp_path, capsys, no_nodes, monkeypatch):
+    def load(path):
+        with contextlib.suppress(KeyboardInterrupt):  # as a callback that C calls
+            signal.raise_signal(signal.SIGINT)
+        return scenario.load(path)
+
+    monkeypatch.setattr(demo, 'load', load)
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        assert demo.main(['--out', str(tmp_path / 'out')]) == 130
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert 'demo: stopped' in capsys.readouterr().err
 
 
 class Clock:

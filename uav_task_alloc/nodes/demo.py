@@ -144,8 +144,12 @@ def find_faults(summary: Mapping[str, object]) -> list[str]:
     return [f'{name} = {summary[name]}' for name in _FAULTS if summary[name]]
 
 
-def fly_scenario(args: argparse.Namespace) -> int:
+def fly_scenario(args: argparse.Namespace, signals: list[int]) -> int:
     """Fly a scenario and write its results into args.out.
+
+    Args:
+        args: of the command line.
+        signals: those to stop, received so far; later ones are added.
 
     Returns:
         0 when no task was lost or flown twice, no zone entered, no separation lost, and every
@@ -155,7 +159,9 @@ def fly_scenario(args: argparse.Namespace) -> int:
     out = args.out
     load(args.scenario)  # an invalid one must not cost earlier results
     run_folder.prepare(out)
-    with received_signals() as signals:
+    with received_signals(signals):
+        if signals:
+            raise KeyboardInterrupt
         processes = start_nodes(args, out)
         try:
             faults = wait_for_end(processes, args.limit, signals)
@@ -172,16 +178,15 @@ def fly_scenario(args: argparse.Namespace) -> int:
 
 
 @contextmanager
-def received_signals() -> Iterator[list[int]]:
-    """A list that fills with the signals to stop, which interrupt nothing meanwhile.
+def received_signals(signals: list[int]) -> Iterator[None]:
+    """Within `with`, signals to stop are added to a list and interrupt nothing.
 
     An exception while the nodes are started would leave some of them running.
     """
-    signals: list[int] = []
     before = {number: signal.signal(number, lambda number, _: signals.append(number))
               for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield signals
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -202,10 +207,16 @@ def write_results(out: Path, duration: float) -> list[str]:
 
 def main(argv: list[str] | None = None) -> int:
     """Command line of the demo; returns the exit status, 130 after a signal."""
+    signals: list[int] = []
+
+    def interrupt(number: int, _: object) -> None:
+        signals.append(number)  # the exception is lost where C calls Python, as LLVM does
+        raise KeyboardInterrupt
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
+        signal.signal(number, interrupt)
     try:
-        return _run(argv)
+        return _run(argv, signals)
     except KeyboardInterrupt:
         print('demo: stopped; there is no summary', file=sys.stderr)
         return _INTERRUPTED
@@ -214,7 +225,7 @@ def main(argv: list[str] | None = None) -> int:
         return 1
 
 
-def _run(argv: list[str] | None) -> int:
+def _run(argv: list[str] | None, signals: list[int]) -> int:
     share = Path(get_package_share_directory(_PACKAGE))
     parser = OptionParser('', __doc__ or '')
     parser.prog = 'demo'
@@ -237,7 +248,7 @@ def _run(argv: list[str] | None) -> int:
     # several demos on one machine, or in one network, must not exchange messages
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    return fly_scenario(args)
+    return fly_scenario(args, signals)
 
 
 if __name__ == '__main__':
