@@ -220,7 +220,8 @@ def test_everything_that_can_be_clicked_is_reached_by_the_tab_key(shown, run):
         assert len(reached) < 60
     lists = {'task', 'SUMMARYEa', 'events', 'left', 'uav-box', 'rest'}  # some only if they scroll
     assert [name for name in reached if name not in lists] == [
-        'theme', 'SUMMARYu1', 'SUMMARYu2', 'map', 'in', 'out', 'fit', 'find', 'live', 'scrub']
+        'theme', 'SUMMARYu1', 'SUMMARYu2', 'map', 'in', 'out', 'fit', 'heat', 'find', 'live',
+        'scrub']
     page.focus('#uavs summary')
     page.keyboard.press('Enter')
     page.wait_for_selector('#uavs details[open]')

@@ -22,7 +22,7 @@ MAX_STREAMS = 32
 PAGE_FILES = {'/': ('index.html', 'text/html'), '/live.css': ('live.css', 'text/css'),
         **{f'/{name}.js': (f'{name}.js', 'text/javascript')
            for name in (
-           'cards', 'chart', 'gantt', 'geo', 'gestures', 'labels', 'layers',
+           'cards', 'chart', 'demand', 'gantt', 'geo', 'gestures', 'labels', 'layers',
            'live', 'map', 'model', 'overlay', 'panels', 'tiles', 'times')}}
 LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 CONTENT_POLICY = (

@@ -34,6 +34,7 @@ function listenToMouse(node, act, at) {
   let start = null, last = null;
   node.addEventListener('pointerdown', event => {
     if (event.pointerType === 'touch' || event.button !== 0) return;
+    if (event.target.closest('button')) return;  // a captured click would not reach it
     start = last = at(event);
     node.setPointerCapture(event.pointerId);
   });

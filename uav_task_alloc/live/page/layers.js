@@ -12,7 +12,7 @@ const GRID_STEP = 130;  // [px] at least between two lines
 export function themeColours() {
   const style = getComputedStyle(document.documentElement);
   const css = name => style.getPropertyValue('--' + name).trim();
-  const names = ['ink', 'faint', 'line', 'card', 'zone', 'bad', 'mark', 'veil'];
+  const names = ['ink', 'faint', 'line', 'card', 'zone', 'bad', 'mark', 'veil', 'heat'];
   const colours = Object.fromEntries(names.map(name => [name, css(name)]));
   return {...colours, uavs: Array.from({length: COLOURS}, (_, k) => css(`uav${k}`))};
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The map: a view of the ENU plane that is moved and zoomed; what is drawn, and what is clicked.
+import {DemandLayer} from './demand.js';
 import {degreesText, frameOf, metresText, roundStep} from './geo.js';
 import {listen} from './gestures.js';
 import {RINGS, drawGrid, drawRings, drawRoutes, drawTasks, drawWaits, drawWorks,
@@ -28,6 +29,7 @@ export class FleetMap {
         this.view.height / 2 - (y - this.view.y) * this.view.scale],
       point: (px, py) => [this.view.x + (px - this.view.width / 2) / this.view.scale,
         this.view.y - (py - this.view.height / 2) / this.view.scale]};
+    this.demand = new DemandLayer();
     this.tiles = new Tiles(null, () => this.schedule());
     listen(node, {pan: (dx, dy) => this.pan(dx, dy), fit: () => this.fit(),
       zoom: (factor, x, y) => this.zoom(factor, x, y), click: (x, y) => this.click(x, y),
@@ -36,6 +38,13 @@ export class FleetMap {
     part('.in').onclick = () => this.zoom(1.6, ...middle());
     part('.out').onclick = () => this.zoom(1 / 1.6, ...middle());
     part('.fit').onclick = () => this.fit();
+    const heat = part('.heat'), legend = box.querySelector('#legend .heat-row');
+    heat.onclick = () => {
+      this.demand.on = legend.hidden;
+      legend.hidden = !this.demand.on;
+      heat.setAttribute('aria-pressed', this.demand.on);
+      this.schedule();
+    };
     new ResizeObserver(() => this.draw()).observe(node);
   }
 
@@ -140,6 +149,7 @@ export class FleetMap {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, view.width, view.height);
     this.tiles.draw(context, view, colours.veil);
+    this.demand.draw(context, view, scene.tasks, colours.heat);
     const texts = drawGrid(context, view, colours);
     drawZones(context, view, scene.zones, colours);
     drawWorks(context, view, scene.works, colours);
