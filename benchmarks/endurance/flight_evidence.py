@@ -40,6 +40,7 @@ class _Visit:
     hold: float  # [s]
     state: _State
     next_at: float = math.inf  # [s] the next item was reached
+    set_at: float = math.inf  # [s] another station has set the current item since
 
 
 class DeliveredEvidence:
@@ -47,6 +48,8 @@ class DeliveredEvidence:
 
     Evidence is MISSION_ITEM_REACHED of that visit, MISSION_CURRENT past its item (or COMPLETE) of
     the same items, or positions at the place while its item was current, for its service time.
+    A MISSION_CURRENT sent after another station has set the current item is none: it would be the
+    same if the item had been skipped just before it was reached.
     """
 
     def __init__(self) -> None:
@@ -98,6 +101,11 @@ class DeliveredEvidence:
             self._visits[task] = _Visit(at, seq, place, hold, self._states[_tick(now)])
             self._judge_positions()
 
+    def set_by_other(self, at: float) -> None:
+        """Note that another station has set the current item at time `at` [s]."""
+        for visit in self._visits.values():
+            visit.set_at = min(visit.set_at, at)
+
     def delivered(self, sent: float, message: Message) -> None:
         """Take a frame of the vehicle that was delivered to the bridge.
 
@@ -119,6 +127,8 @@ class DeliveredEvidence:
         if message.get_type() == 'MISSION_ITEM_REACHED':
             return bool(message.seq == visit.seq) and sent < visit.next_at
         state, end = self._states.get(_tick(sent)), visit.seq + 1
+        if sent > visit.set_at:
+            return False
         if state is not None and state.seq is None and visit.at < self._held_from:
             return False
         past = message.seq > visit.seq or (

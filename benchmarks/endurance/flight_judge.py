@@ -152,6 +152,7 @@ class Judge:
                     fresh or self._taken_by_disarm)
         elif event.name == 'command' and event.command == 'set current' and event.cause != OURS:
             self._set_at = event.t
+            self._evidence.set_by_other(event.t)
         elif event.name == 'armed':
             self._armed = True
             if self._taken_by_disarm and self.known_at is None:

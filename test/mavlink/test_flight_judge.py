@@ -72,6 +72,16 @@ def test_a_frame_is_evidence_where_it_shows_that_the_item_was_reached(sent, mess
     assert ('B' in evidence.known) is known
 
 
+@pytest.mark.parametrize(('sent', 'known'), [(10.6, True), (11.4, False)])
+def test_a_current_item_that_another_station_has_set_is_no_evidence(sent, known):
+    evidence = Visit().fly()
+    evidence.set_by_other(11.0)
+    evidence.delivered(sent, current(4))
+    assert ('B' in evidence.known) is known
+    evidence.delivered(sent, d.MAVLink_mission_item_reached_message(2))
+    assert 'B' in evidence.known
+
+
 @pytest.mark.parametrize(('first', 'known'), [(8.0, True), (9.2, False)])
 def test_positions_are_evidence_once_they_span_the_service_time(first, known):
     evidence = Visit(hold=2.0).fly()
