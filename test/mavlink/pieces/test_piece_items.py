@@ -140,6 +140,46 @@ def test_a_gap_while_another_mission_may_be_on_board_is_not_flown():
     assert flown.leave().rest() == [(100, 0), (300, 0), (300, 300)]
 
 
+def test_a_gap_after_the_mission_was_replaced_is_not_flown():
+    flown = Flown().fly(at(0, 0), at(100, 0))
+    version = flown.coverage.version
+    flown.coverage.note_replaced(Item(16, task='X'))
+    flown.fly(at(102, 2), at(104, 5), item=Item(16, task='X'))
+    flown.t += 400.0 / SPEED
+    flown.fly(at(300, 200), at(300, 300), item=Item(16, task='X'))
+    assert not flown.covered
+    assert flown.coverage.version == version  # else the mission on board is another one at once
+    assert flown.rest() == [(100, 0), (300, 0), (300, 300)]
+
+
+def test_a_mission_that_continues_a_way_leaves_nothing():
+    flown = Flown().fly(at(0, 0), at(100, 0))
+    flown.coverage.note_replaced(ALONG)
+    assert flown.fly(at(100, 0), at(300, 0), at(300, 300)).covered
+    assert not flown.coverage.left
+
+
+def test_a_way_of_a_replaced_mission_that_is_begun_again_is_followed():
+    flown = Flown().fly(at(0, 0), at(100, 0))
+    flown.coverage.note_replaced(Item(16, task='X'))
+    flown.fly(at(100, 0), at(0, -60), at(0, 0), item=Item(16, task='X'))
+    assert flown.fly(at(0, 0), at(300, 0), at(300, 300)).covered
+
+
+def test_silence_after_a_position_off_a_way_that_is_current_covers_nothing():
+    flown = Flown(task=piece('L', (0, 0), (60, 0))).fly(at(30, -100), at(33, -90))
+    flown.t += 20.0
+    flown.fly(at(60, 10), at(60, 60), item=Item(16, task='X'))
+    assert not flown.covered
+
+
+def test_silence_in_which_the_mission_was_left_flies_no_way_on():
+    flown = Flown().fly(at(0, 0), at(100, 0))
+    flown.t += 600.0 / SPEED
+    flown.fly(at(100, 300), at(100, 310)).leave()
+    assert flown.rest() == [(100, 0), (300, 0), (300, 300)]
+
+
 def test_a_gap_that_is_too_short_for_the_way_is_not_flown():
     flown = Flown().fly(at(0, 0), at(100, 0))
     flown.t += 4.0
@@ -156,7 +196,7 @@ def test_a_way_that_ended_in_silence_is_covered_once_there_was_the_time():
 def test_a_restarted_bridge_knows_the_rest():
     flown = Flown().fly(at(0, 0), at(300, 0), at(300, 90)).leave()
     again = Flown()
-    again.coverage.restore(flown.coverage.marks(()), [again.stop], None)
+    again.coverage.restore(flown.coverage.marks(()), [again.stop], (), SPEED)
     assert again.rest() == [(300, 90), (300, 300)]
     assert flown.coverage.marks({'L'}) == ()
 
@@ -164,7 +204,7 @@ def test_a_restarted_bridge_knows_the_rest():
 def test_a_mark_of_another_way_of_that_id_is_ignored():
     flown = Flown().fly(at(0, 0), at(300, 0)).leave()
     again = Flown(task=piece('L', (0, 0), (300, 0), (300, 310)))
-    again.coverage.restore(flown.coverage.marks(()), [again.stop], None)
+    again.coverage.restore(flown.coverage.marks(()), [again.stop], (), SPEED)
     assert again.rest()[0] == (0, 0)
 
 

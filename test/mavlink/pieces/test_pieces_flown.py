@@ -263,3 +263,72 @@ def test_a_way_left_in_silence_for_a_list_that_is_not_confirmed_is_flown_later()
     bench.line.tampers.clear()
     assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
     assert min(track.times_flown(line)) == 1
+
+
+@BOTH
+@pytest.mark.parametrize(('store', 'early'), [
+    (True, True), (True, False), (False, True), (False, False)])
+def test_a_strip_whose_end_another_station_sets_before_a_kill_is_flown(kind, store, early):
+    strips = [strip(k, actions=()) for k in range(3)]
+    bench, track = surveying(kind, list_of(*strips))
+    assert bench.run(lambda: bench.started() == ['F#0'])
+    bench.run(limit=1.0)
+    end = d.MAVLink_mission_set_current_message(1, 1, bench.onboard().own + 1)
+    if early:
+        bench.from_station(end)
+        bench.run(limit=1.5)
+    if not store:
+        bench.store = Store()
+    bench.line.cut = True
+    bench.from_station(end)
+    bench.run(limit=15.0)
+    bench.line.cut = False
+    bench.start()
+    bench.discover()
+    bench.assign(list_of(*strips, revision=2))
+    assert bench.run(lambda: len(bench.completed()) == 3, 300.0)
+    assert min(track.times_flown(strip(0))) == 1
+
+
+@BOTH
+def test_a_strip_whose_end_another_station_sets_before_a_silence_is_flown(kind):
+    strips = [strip(k, actions=()) for k in range(3)]
+    bench, track = surveying(kind, list_of(*strips))
+    assert bench.run(lambda: bench.started() == ['F#0'])
+    bench.run(limit=1.0)
+    bench.from_station(d.MAVLink_mission_set_current_message(1, 1, bench.onboard().own + 1))
+    bench.run(limit=1.5)
+    bench.line.cut = True
+    bench.run(limit=16.0)
+    bench.line.cut = False
+    assert bench.run(lambda: len(bench.completed()) == 3, 300.0)
+    assert min(track.times_flown(strip(0))) == 1
+
+
+@BOTH
+def test_a_strip_that_ends_while_no_bridge_runs_is_flown_once(kind):
+    bench, track = surveying(kind, list_of(strip(0), strip(1), turned=('F#1',)))
+    halfway(bench, strip(0), 120.0)
+    bench.line.cut = True
+    bench.run(limit=12.0)
+    bench.line.cut = False
+    bench.start()
+    bench.discover()
+    bench.assign(list_of(strip(0), strip(1), revision=2, turned=('F#1',)))
+    assert bench.run(lambda: len(bench.completed()) == 2, 300.0)
+    for each in (strip(0), strip(1)):
+        assert set(track.times_flown(each)) == {1}
+
+
+def test_a_way_left_in_silence_for_another_list_is_flown_later():
+    line = piece('L', (0, 60), (200, 60))
+    other = piece('M', (150, 80), (300, 80))
+    bench, track = surveying('px4', list_of(line, other))
+    halfway(bench, line, 20.0)
+    bench.assign(list_of(other, line, revision=2))
+    assert bench.run(lambda: bench.onboard().verified(), 20.0)
+    bench.line.cut = True
+    bench.run(limit=14.0)
+    bench.line.cut = False
+    assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
+    assert min(track.times_flown(line)) == 1

@@ -223,6 +223,9 @@ class AuthorityRecord:
     mission: int | None = None  # checksum of the items on board
     current: int | None = None  # index of the item being flown, home not counted
     arrived: bool = False  # the vehicle was seen at that item
+    # index after the items from `current` on that it has passed in order, which are not known to
+    # be flown, and whether it has left mission mode unseen since: 0 no, 1 yes, 2 perhaps
+    passed: tuple[int, ...] = ()
     uploading: tuple[int, ...] = ()  # checksum of a mission being uploaded, index of its start
     # vehicle time [s], position [m] and velocity [m/s], both ENU, of one or two recent positions
     seen: tuple[float, ...] = ()

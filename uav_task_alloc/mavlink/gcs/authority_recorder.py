@@ -41,6 +41,7 @@ class AuthorityRecorder:
         self._mode = record.mode if record else None  # the last mode with a known reason
         self._seen: tuple[float, ...] = ()
         self._seen_at = -math.inf  # vehicle time [s] of the newest of them
+        self._passed: tuple[int, ...] = ()  # when it was recorded
         self.marks: dict[str, TaskMark] = {m.task: m for m in record.marks} if record else {}
 
     def mark_task(self, task: str, position: Point | None, flown: bool, now: float) -> None:
@@ -52,10 +53,11 @@ class AuthorityRecorder:
                       if now - mark.at < _MARK_LIFETIME}
         self.marks[task] = TaskMark(task, *position, round(now, 3), flown)
 
-    def _last_position(self) -> tuple[float, ...]:
-        """The last positions, renewed each _POSITION_PERIOD."""
+    def _last_position(self, passed: tuple[int, ...]) -> tuple[float, ...]:
+        """The last positions, renewed each _POSITION_PERIOD, and once items are passed."""
         since = self._evidence.position_time() - self._seen_at
-        if not 0.0 <= since < _POSITION_PERIOD:
+        if passed != self._passed or not 0.0 <= since < _POSITION_PERIOD:
+            self._passed = passed
             positions = self._evidence.last_positions()
             self._seen = positions or self._seen
             self._seen_at = positions[_LAST_TIME] if positions else -math.inf
@@ -68,15 +70,15 @@ class AuthorityRecorder:
             return
         if state.unexplained is None:  # else a restarted bridge would accept the new mode
             self._mode = state.mode
-        position = self._evidence.mission_position()
+        position, passed = self._evidence.mission_position(), self._evidence.passed()
         fields = (
             authority.state, authority.why, authority.since, authority.killed, authority.landed,
             authority.until_landing, state.flown, self._mode, state.armed,
             tuple(dict.fromkeys(mode for mode, _ in sent.modes)) if sent.modes else (),
             sent.arm_until > -math.inf and not state.armed and authority.held,
             state.replacing_since, sent.climb, tuple(self.marks.values()),
-            *position, self._evidence.uploading(),
-            self._last_position(),
+            *position, passed, self._evidence.uploading(),
+            self._last_position(passed),
             None if math.isnan(state.landed_battery) else round(state.landed_battery, 3),
             self._evidence.pieces(), self._evidence.ahead(position[1]))
         if fields == self._fields:  # as after most messages

@@ -21,7 +21,7 @@ from urllib.parse import quote
 from uav_task_alloc.atomic_files import replace_file, sync_folder
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState, TaskMark
-from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
+from uav_task_alloc.mavlink.mission.piece_mark import LEFT, MISSED, PieceMark
 
 _POSITION, _POSITION_SUFFIX = 'seen', '.position'  # field with a file of its own
 _FORMAT = 1  # of the file; one of a newer format is refused
@@ -201,8 +201,8 @@ def _record(body: Any, uav_id: str) -> AuthorityRecord:
         raise ValueError(f'uav_id = {body["uav_id"]!r:.250}: expected {uav_id!r}')
     row = body['record']
     if isinstance(row, dict):  # files of earlier versions do not have it
-        row = {'arrived': False, 'uploading': [], 'landed_battery': None, 'pieces': [],
-               'ahead': [], **row}
+        row = {'arrived': False, 'passed': [], 'uploading': [], 'landed_battery': None,
+               'pieces': [], 'ahead': [], **row}
     if not isinstance(row, dict) or row.keys() != _CHECKS.keys():
         raise ValueError('record: expected ' + ', '.join(_CHECKS))
     record = {}
@@ -246,9 +246,11 @@ def _are_marks(value: Any) -> bool:
 
 def _are_pieces(value: Any) -> bool:
     return isinstance(value, list) and all(
-        isinstance(mark, list) and len(mark) == 8 and _is_text(mark[0])
+        isinstance(mark, list) and len(mark) in (8, 9) and _is_text(mark[0])
         and all(map(_is_time, (*mark[1:6], mark[7]))) and isinstance(mark[6], bool)
-        and 0.0 <= mark[4] < mark[5] and mark[7] >= 0.0 for mark in value)
+        and 0.0 <= mark[4] < mark[5] and mark[7] >= 0.0
+        and all(type(state) is int and LEFT <= state <= MISSED for state in mark[8:])
+        for mark in value)
 
 
 # by type of the field: whether a JSON value is valid, and its conversion

@@ -101,6 +101,16 @@ class MissionEvidence:
                            current)
         return self._checksum[1], current, progress.has_arrived(current)
 
+    def passed(self) -> tuple[int, ...]:
+        """`AuthorityRecord.passed`; () where none is open."""
+        progress = self._onboard.progress
+        (tasks, left), held = progress.passed_in_flight, progress.items
+        if not tasks or progress.current is None:
+            return ()
+        end = max((n + 1 for n, item in enumerate(held[:progress.current])
+                   if item.task in tasks), default=0)
+        return (end, left) if end else ()
+
     def pieces(self) -> tuple[PieceMark, ...]:
         """The tasks whose ways are partly flown."""
         progress = self._onboard.progress

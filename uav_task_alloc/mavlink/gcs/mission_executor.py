@@ -117,11 +117,11 @@ class MissionExecutor:
         if record is not None:
             onboard.list.stored_pieces, resume.recorded_upload = record.pieces, record.uploading
             resume.recorded = record.mission, record.current, record.arrived
+            resume.passed, onboard.progress.coverage.recorded = record.passed, True
             resume.ahead = {mark.task: mark[1:4] for mark in record.ahead}
             for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
                 t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
-                onboard.progress.positions.add_recorded(
-                    PositionSample(t, (x, y, z), (east, north, up)))
+                resume.note_seen(PositionSample(t, (x, y, z), (east, north, up)))
             resume.was_disarmed = not record.armed
             # the current item may be of the replaced mission, or set by another party
             resume.current_unreliable = (

@@ -379,9 +379,9 @@ class OnboardMission:
                 held, known, self.tasks is not None, lambda: self._can_continue(held), now):
             return
         self.resume.keep_flown()
-        current = self._telemetry.current
-        self.progress.begin(held, None if current is None or not held
-                            else max(0, current - self.own), now, read=True)
+        (items, since), current = self.resume.read_again(held, self.tasks), self._telemetry.current
+        current = None if current is None or not held else max(0, current - self.own)
+        self.progress.begin(items, current, now, read=True, since=since)
 
     def _can_continue(self, held: tuple[Item, ...]) -> bool:
         """Whether the list can be flown with a mission without replacing it."""

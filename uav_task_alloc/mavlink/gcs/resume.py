@@ -9,29 +9,27 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from itertools import chain
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.unread_reached import UnreadReached
+from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import (
     Item,
     MissionStop,
     TaskList,
     alike,
-    mission_items,
     with_position,
 )
-from uav_task_alloc.mavlink.mission.long_legs import with_points_between
-from uav_task_alloc.mavlink.mission.passed_items import flown_between
+from uav_task_alloc.mavlink.mission.passed_items import flown_between, flown_in_gap
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.stop_items import place_of
+from uav_task_alloc.mavlink.mission.task_items import TaskItems
 from uav_task_alloc.model import Point, Task
 
 _SAME_PLACE = 1.0  # [m]
@@ -49,27 +47,6 @@ def checksum(items: Iterable[Item]) -> int:
     return zlib.crc32(repr([(item.command, item.x, item.y) for item in items]).encode())
 
 
-@dataclass(slots=True)
-class _UnreadReached:
-    """A REACHED that was received before the mission was read."""
-
-    seq: int  # index without home
-    at: float  # [s] received
-    frame: int  # its number
-    place: Point | None  # [m] ENU of the vehicle; None: not known
-    current_after: int | None = None  # the largest current item reported since
-
-    def may_be_of(self, held: tuple[Item, ...], repeats: bool) -> bool:
-        """Whether the current item was past it then; a repetition of another mission may not.
-
-        Where REACHED is repeated (PX4), a current item has to show it.
-        """
-        after, last = self.current_after, len(held) - 1
-        if after is None:
-            return self.seq <= last and not repeats
-        return self.seq <= last and (after > self.seq or self.seq == after == last)
-
-
 class Resume:
     """Locates a vehicle in its onboard mission once, and finds the tasks it has flown.
 
@@ -84,18 +61,21 @@ class Resume:
                  progress: ProgressTable) -> None:
         self._profile, self._origin = profile, origin
         self._telemetry, self._progress = telemetry, progress
+        self._tasks = TaskItems(profile, origin, progress.coverage, lambda: self.cruise())
         self.unflown: dict[str, Point] = {}  # [m] ENU, by task; skipped by another station
         self.reported: set[str] = set()  # flown and reported by the previous run
         self.ahead: dict[str, Point] = {}  # [m] ENU, by id; the next tasks of the previous run
         # checksum of the mission, current item and whether it was seen there, of the previous run
         self.recorded: tuple[int | None, int | None, bool] = None, None, False
+        self.passed: tuple[int, ...] = ()  # see `AuthorityRecord`
+        self._seen: tuple[PositionSample, ...] = ()  # the last positions of the previous run
         self.recorded_upload: tuple[int, ...] = ()  # checksum and first item of an upload then
         self.was_disarmed = True  # in the last record; or there is none
         self.cruise: Callable[[], float] = lambda: math.nan  # [m/s]; NaN: not known
         self._missions: tuple[tuple[Item, ...], ...] = ()  # read so far
         self.current_unreliable = False  # items before the current one may be unflown
         self._rebooted = self._passed_recorded = False
-        self._unread: list[_UnreadReached] = []  # until the vehicle is located
+        self._unread: list[UnreadReached] = []  # until the vehicle is located
         self.reset()
 
     def note_mark(self, task: str, place: Point, flown: bool) -> None:
@@ -105,11 +85,17 @@ class Resume:
         else:
             self.unflown[task] = place
 
+    def note_seen(self, sample: PositionSample) -> None:
+        """Take a position that the previous run has recorded."""
+        self._seen += (sample,)
+        self._progress.positions.add_recorded(sample)
+
     def rebooted(self) -> None:
         """Reset after a restart of the vehicle, whose current item starts at the first."""
         _, recorded, arrived = self.recorded
         self._passed_recorded = arrived and recorded is not None and any(
             seq > recorded for seq, _, _ in self._currents)
+        self.passed = () if self.located else self.passed
         self.reset()
         self._rebooted = True
 
@@ -142,7 +128,7 @@ class Resume:
         if len(self._unread) < _MAX_UNREAD and all(seq != each.seq for each in self._unread):
             known = self._telemetry.has_position
             self._unread.append(
-                _UnreadReached(seq, now, frame, self._telemetry.position if known else None))
+                UnreadReached(seq, now, frame, self._telemetry.position if known else None))
 
     def _credit_unread(self, held: tuple[Item, ...], now: float) -> None:
         """Credit each REACHED received before the mission was read, by the positions."""
@@ -153,7 +139,7 @@ class Resume:
             self._reached += reached
             self._until = now + MAX_AGE
 
-    def _is_of(self, reached: _UnreadReached, held: tuple[Item, ...]) -> bool:
+    def _is_of(self, reached: UnreadReached, held: tuple[Item, ...]) -> bool:
         """Whether a REACHED can be of the mission on board, by the current item and the place."""
         if not reached.may_be_of(held, self._profile.atomic):
             return False
@@ -200,6 +186,7 @@ class Resume:
             return
         self.located = True
         self._missions = (*self._missions[-_MAX_MISSIONS:], held)
+        self._credit_passed(held, now)
         replaced = self._find_upload(held)
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
@@ -224,7 +211,7 @@ class Resume:
         flown = len(held) if ended else current
         first = min(self._currents[0][0], flown) if self._currents else flown
         self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
-        items = held[:flown] + self._with_tasks(held[flown:], tasks)
+        items = held[:flown] + self._tasks.tagged(held[flown:], tasks)
         self._progress.begin(items, flown, now, read=True)
         self._epoch, self._located_at = self._progress.epoch, flown
         # the previous run has reported earlier items, or recorded that they were skipped
@@ -234,12 +221,34 @@ class Resume:
         if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
             self._until = now + MAX_AGE
 
+    def _credit_passed(self, held: tuple[Item, ...], now: float) -> None:
+        """Credit what the previous run has seen passed and had still to judge."""
+        mission, recorded, arrived = self.recorded
+        if len(self.passed) != 2 or mission != checksum(held) or recorded is None:
+            return
+        flown = {recorded} if arrived else set()
+        end, left = self.passed
+        left &= 1 if self._telemetry.mode is ModeFunction.MISSION else 3
+        flown |= flown_in_gap(self._placed(held), recorded, end, self._seen, bool(left),
+                              self._home_of(held))
+        passed = tuple(held[n] for n in sorted(flown))
+        self._flown, self._reached = self._flown + passed, self._reached + passed
+        self._until = now + MAX_AGE if passed else self._until
+
+    def _placed(self, held: tuple[Item, ...]) -> tuple[Item, ...]:
+        return tuple(with_position(item, self._origin) for item in held)
+
+    def _home_of(self, held: tuple[Item, ...]) -> Point | None:
+        """Where a mission returns to; None: it does not, or not known."""
+        returns = held[-1].command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        return self._telemetry.home if returns else None
+
     def _find_upload(self, held: tuple[Item, ...]) -> bool:
         """Continue at its first item where the recorded upload is on board, and whether it is."""
         upload = self.recorded_upload
         if len(upload) != 2 or not upload[0] == checksum(held) != self.recorded[0]:
             return False
-        self.recorded = upload[0], upload[1], False
+        self.recorded, self.passed = (upload[0], upload[1], False), ()
         return True
 
     def _continues_recorded(self, held: tuple[Item, ...]) -> bool:
@@ -258,12 +267,14 @@ class Resume:
         if ended:
             current, when = len(held), now
         self._old, self._until = held[:recorded], now + MAX_AGE
-        flown = self._flown_since(held, recorded, current, when)
+        # what was passed before is judged by the positions of before
+        begin = min(max(recorded, *self.passed[:1], 0), current)
+        flown = self._flown_since(held, begin, current, when)
         if arrived and current > recorded:
             flown |= {recorded}
-        self._flown += tuple(held[n] for n in sorted(flown))
-        self._reached += tuple(held[n] for n in sorted(flown))
-        items = held[:current] + self._with_tasks(held[current:], tasks)
+        passed = tuple(held[n] for n in sorted(flown))
+        self._flown, self._reached = self._flown + passed, self._reached + passed
+        items = held[:current] + self._tasks.tagged(held[current:], tasks)
         progress.begin(items, current, now, read=True)
         self._epoch, self._located_at = progress.epoch, recorded
         self._replay(held)
@@ -272,11 +283,9 @@ class Resume:
         """Indices in [begin, end) at which the vehicle was until steady time `now` [s]."""
         if begin == end or len(self._currents) == 0:
             return set()
-        placed = tuple(with_position(item, self._origin) for item in held)
         frame = max(frame for _, when, frame in self._currents if when <= now)
-        home = (self._telemetry.home if held[-1].command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH
-                else None)
-        return flown_between(placed, begin, end, now, frame, self._progress.positions, home)
+        return flown_between(self._placed(held), begin, end, now, frame,
+                             self._progress.positions, self._home_of(held))
 
     def _replay(self, held: tuple[Item, ...]) -> None:
         """Pass on what was received until the mission was read, in the order it was sent."""
@@ -291,33 +300,25 @@ class Resume:
             else:
                 self._progress.note_reached(seq, when, proven=True, frame=frame)
 
-    def _with_tasks(self, held: tuple[Item, ...], tasks: TaskList) -> tuple[Item, ...]:
-        """Items that were read, with the tasks of a list and their positions."""
-        rest = self._progress.coverage.rest
-        stops = tuple(rest(MissionStop(s.task, reversed=s.reversed)) for s in tasks.stops)
-        wanted, found, at = self._items_of(stops), [], 0
-        for each in held:  # ways may share points: the order tells which of them it is
-            order = chain(range(at, len(wanted)), range(at))
-            n = next((n for n in order if alike(wanted[n], each)), None)
-            found.append(each if n is None else wanted[n])
-            at = at if n is None else n + 1
-        return tuple(found)
+    def read_again(self, held: tuple[Item, ...], tasks: TaskList | None,
+                   ) -> tuple[tuple[Item, ...], float | None]:
+        """Return the items of a mission that was read, and since when [s] they are flown.
 
-    def _items_of(self, stops: tuple[MissionStop, ...]) -> tuple[Item, ...]:
-        """The items of stops without their detour points; none of those that are refused."""
-        rules, origin, cruise = self._profile.rules, self._origin, self.cruise()
-        divided = with_points_between(TaskList(0, stops)).stops
-        rows = tuple(replace(stop, via=()) for stop in divided)
-        try:
-            return mission_items(TaskList(0, rows), rules, origin, cruise=cruise)
-        except MissionError as error:
-            others = tuple(stop for stop in stops if stop.task.id != error.task)
-            return self._items_of(others) if len(others) < len(stops) else ()
+        Once it was located they have their tasks, and count from now on: what was reported before
+        may be of another mission.
+
+        Args:
+            held: the items, without home.
+            tasks: the list.
+        """
+        if tasks is None or not self.located:
+            return held, None
+        return self._tasks.tagged(held, tasks), self._progress.path.newest
 
     def keep_flown(self) -> None:
         """Keep the flown items of this mission before it is replaced."""
-        self._flown += self._flown_here()
-        self._reached += self._reached_of(self._flown_here())
+        here = self._flown_here()
+        self._flown, self._reached = self._flown + here, self._reached + self._reached_of(here)
 
     def flown_items(self, now: float) -> tuple[Item, ...]:
         """Flown items that were not reported; none when no task can be credited any more."""
@@ -340,9 +341,8 @@ class Resume:
                  if now < self._until or self.ahead.get(task.id) == task.position]
         found = []
         for turned in (False, True):
-            stops = tuple(MissionStop(task, reversed=turned) for task in named
-                          if task.path or not turned)
-            ends = {item.task: item for item in self._items_of(stops) if item.completes}
+            stops = tuple(MissionStop(t, reversed=turned) for t in named if t.path or not turned)
+            ends = {item.task: item for item in self._tasks.items_of(stops) if item.completes}
             found += [stop.task for stop in stops if stop.task.id in ends and any(
                 alike(ends[stop.task.id], other) and self._is_flown(stop.task, other)
                 and self._comes_along(stop, other) for other in flown)]

@@ -102,6 +102,13 @@ class CurrentItem:
         begin, end = self._left_unseen
         return not self.in_mission and begin <= end == self._left_at
 
+    @property
+    def may_have_left(self) -> bool:
+        """Whether positions are missing since it was in mission mode by the last message."""
+        path = self._positions.path
+        return self.in_mission and path.newest > self._in_mission_at and (
+            path.has_gap(self._in_mission_at, path.newest))
+
     def note_other_mode(self, now: float) -> None:
         """Note that the vehicle is not in mission mode, by whichever command."""
         if not self.in_mission:
@@ -176,7 +183,7 @@ class CurrentItem:
         for claim in self.passed.claims:
             judged = self.passed.judge(claim, tuple(
                 i for i in claim.items if i.task not in self._tasks), now,
-                claim.since < self._left_unseen[1] and self._left_unseen[0] <= claim.until)
+                self.left_unseen_since(claim))
             for item in judged.flown:
                 self._tasks.complete(item.task, item.place)
             self._pass_over(judged.passed_over, claim)
@@ -188,6 +195,11 @@ class CurrentItem:
         self.skipped.extend(item.task for item in items)
         if items and claim.epoch == self._epoch.number:
             self.set_by_other = self._epoch.current
+
+    def left_unseen_since(self, claim: Claim) -> bool:
+        """Whether it may have left mission mode unseen since it passed the items of a claim."""
+        begin, end = self._left_unseen
+        return claim.since < end and begin <= claim.until
 
     def claim(self, begin: int, end: int, now: float, frame: int | None = None,
               in_flight: bool = True) -> None:

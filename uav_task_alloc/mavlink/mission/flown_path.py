@@ -61,6 +61,11 @@ class FlownPath:
         """The newest sample; None where there is none."""
         return self._samples[-1] if self._samples else None
 
+    @property
+    def samples(self) -> tuple[PositionSample, ...]:
+        """All samples, in order."""
+        return tuple(self._samples)
+
     def last(self, since: float) -> tuple[PositionSample, ...]:
         """The newest sample, after the one before the latest gap.
 

@@ -7,10 +7,11 @@ completed at which the vehicle's own positions were.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from uav_task_alloc.mavlink.mission.flown_path import CLOSE, GAP, Visit
+from uav_task_alloc.mavlink.mission.flown_path import CLOSE, GAP, PositionSample, Visit
 from uav_task_alloc.mavlink.mission.item import Item, leg_count
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, PositionHistory
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
@@ -72,10 +73,15 @@ class PassedItems:
         self._claims = [replace(claim, frames=None) if any(item is one for one in claim.items)
                         else claim for claim in self._claims]
 
-    def seen(self) -> tuple[Item, ...]:
-        """Items of open claims at which the vehicle was seen, where nothing more will come."""
+    def seen(self, in_order: bool = False) -> tuple[Item, ...]:
+        """Items of open claims at which the vehicle was seen, where nothing more will come.
+
+        Args:
+            in_order: only those that were passed one by one, as a mission is flown.
+        """
         return tuple(item for claim in self._claims for item in claim.items
-                     if self._visit(item, claim) is Visit.YES or self._approached(item, claim))
+                     if not (in_order and claim.skips) and (
+                         self._visit(item, claim) is Visit.YES or self._approached(item, claim)))
 
     def clear(self) -> None:
         """Drop all claims: the mission on board is unknown."""
@@ -117,12 +123,17 @@ class PassedItems:
         """At the deadline: the items that can have been flown in a gap of the positions."""
         items = tuple(
             i for i in rest if visits[i.task] is Visit.UNOBSERVED and i.position is not None)
-        return items if items and self._flown_unseen(items, claim, left_unseen) else ()
+        return items if items and self.flown_unseen(items, claim, left_unseen) else ()
 
-    def _flown_unseen(self, items: tuple[Item, ...], claim: Claim, left_unseen: bool) -> bool:
+    def flown_unseen(self, items: tuple[Item, ...], claim: Claim, left_unseen: bool) -> bool:
         """Whether it reappeared on a leg after them, and had the time to fly there.
 
         Where it has left mission mode unseen, it may reappear anywhere after a single item.
+
+        Args:
+            items: of the claim, that were not observed.
+            claim: of them.
+            left_unseen: whether it has left mission mode unseen since.
         """
         at = [n for n, item in enumerate(claim.route) if any(item is one for one in items)]
         if not at:
@@ -204,10 +215,40 @@ def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, fra
     Returns:
         Indices of those that were flown.
     """
+    claim = replace(_numbered_claim(items, begin, end, home),
+                    until=positions.vehicle_time(now), frame=frame)
+    judged = PassedItems(FrameLog(), positions).judge(claim, claim.items, now)
+    return {int(item.task) for item in judged.flown}
+
+
+def flown_in_gap(items: tuple[Item, ...], begin: int, end: int,
+                 samples: Iterable[PositionSample], left_unseen: bool,
+                 home: Point | None = None) -> set[int]:
+    """Judge the items that the previous run has seen passed, by the positions it has stored.
+
+    Args:
+        items: on board, with their positions.
+        begin: index of the first item.
+        end: index after the last item.
+        samples: those positions, in order; only a gap between them is evidence.
+        left_unseen: whether it has left mission mode in that gap.
+        home: see `flown_between`.
+
+    Returns:
+        Indices of those that were flown.
+    """
+    positions, claim = PositionHistory(), _numbered_claim(items, begin, end, home)
+    for sample in samples:
+        positions.path.add(sample)
+    placed = tuple(item for item in claim.items if item.position is not None)
+    flown = PassedItems(FrameLog(), positions).flown_unseen(placed, claim, left_unseen)
+    return {int(item.task) for item in placed} if flown else set()
+
+
+def _numbered_claim(items: tuple[Item, ...], begin: int, end: int, home: Point | None) -> Claim:
+    """A claim about the items of a mission that was read, each with its index as its task."""
     passed = tuple(replace(items[n], task=f'{n}') for n in range(begin, end)
                    if not items[n].is_action)
     route = tuple(item for item in (*passed, *items[end:]) if item.position is not None)
-    claim = Claim(passed, route, -math.inf, positions.vehicle_time(now), -math.inf, 0, None, frame,
-                  skips=leg_count(passed) > 1, in_flight=True, home=home)
-    judged = PassedItems(FrameLog(), positions).judge(claim, passed, now)
-    return {int(item.task) for item in judged.flown}
+    return Claim(passed, route, -math.inf, math.inf, -math.inf, 0, None, None,
+                 skips=leg_count(passed) > 1, in_flight=True, home=home)

@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections import deque
-from collections.abc import Container, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Container, Iterable, Sequence
+from dataclasses import replace
 from itertools import accumulate, pairwise
 
-from uav_task_alloc.geometry.polyline import nearest_on_segment, point_at, segment_fraction
+from uav_task_alloc.geometry.polyline import nearest_on_segment, segment_fraction
 from uav_task_alloc.mavlink.mission.flown_path import GAP, PositionSample
 from uav_task_alloc.mavlink.mission.item import Item
-from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
+from uav_task_alloc.mavlink.mission.piece import Piece
+from uav_task_alloc.mavlink.mission.piece_mark import LEFT, MISSED, UNDER_WAY, PieceMark
 from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.mavlink.mission.task_list import MissionStop
 from uav_task_alloc.model import Point
@@ -29,58 +30,6 @@ _SHORTEST = 1.0  # [m] of a flown part or of a rest
 _KEPT = 64  # pieces
 
 
-@dataclass(slots=True)
-class _Piece:
-    """A way of the list, in metres from the first point of its path."""
-
-    path: tuple[Point, ...]
-    place: Point
-    at: list[float]  # [m] of each point
-    low: float
-    high: float
-    reversed: bool = False
-    flown: float = 0.0  # [m] of the part between `low` and `high`, in the direction of flight
-    seen: float | None = None  # vehicle time [s] of the last position on it
-    off: tuple[float, float] | None = None  # vehicle time [s], [m] to go back: seen off it since
-    way: list[Point] = field(default_factory=list)  # that part in the direction of flight
-    way_at: list[float] = field(default_factory=list)  # [m] of each of its points
-
-    def measure(self) -> None:
-        """Cut the part that is left out of the path."""
-        inner = [p for p, at in zip(self.path, self.at, strict=True)
-                 if self.low < at < self.high]
-        self.way = [self.point(self.low), *inner, self.point(self.high)]
-        if self.reversed:
-            self.way.reverse()
-        self.way_at = [0.0, *accumulate(math.dist(a, b) for a, b in pairwise(self.way))]
-
-    def point(self, metres: float) -> Point:
-        n = min(max(bisect_right(self.at, metres) - 1, 0), len(self.path) - 2)
-        length = self.at[n + 1] - self.at[n]
-        if metres <= self.at[0] or metres >= self.at[-1] or length <= 0.0:
-            return self.path[0 if metres <= self.at[0] else -1 if metres >= self.at[-1] else n]
-        x, y, z = point_at(self.path[n], self.path[n + 1], (metres - self.at[n]) / length)
-        return x, y, z
-
-    def next_point(self) -> Point:
-        """The end of the flown part."""
-        return self.point(self.high - self.flown if self.reversed else self.low + self.flown)
-
-    def commit(self) -> bool:
-        """Leave out the flown part from now on; whether there is one."""
-        if self.flown < _SHORTEST:
-            self.flown, self.seen, self.off = 0.0, None, None
-            return False
-        left = max(self.high - self.low - self.flown, _SHORTEST)
-        if self.reversed:
-            self.high = self.low + left
-        else:
-            self.low = self.high - left
-        self.flown, self.seen, self.off = 0.0, None, None
-        self.measure()
-        return True
-
-
 class PieceCoverage:
     """The ways of the list of one vehicle.
 
@@ -90,17 +39,20 @@ class PieceCoverage:
     Attributes:
         version: changes with the ways that are left.
         mission_known: whether the mission on board is known, so that what is flown in silence is.
+        recorded: what was flown before this run of the bridge was stored.
     """
 
     def __init__(self, plane: bool = False) -> None:
         self.version, self.mission_known = 0, True
         self._corridor = _CORRIDOR_PLANE if plane else _CORRIDOR
-        self._pieces: dict[str, _Piece] = {}
+        self._pieces: dict[str, Piece] = {}
         self.left: deque[str] = deque(maxlen=_KEPT)  # ways that were left, to be taken
         self._partly: dict[str, None] = {}  # those of which a part is flown
         self._under_way: str | None = None
         self._ending: str | None = None  # passed in flight; it is not known how far it was flown
         self._sampled = -math.inf  # vehicle time [s] of the newest position
+        self._restored: set[str] = set()  # under way when the previous run of the bridge ended
+        self.recorded = False  # what was flown before this run is known by its file
         self._recent: deque[PositionSample] = deque(maxlen=_RECENT)  # in mission mode, without gap
         self._fastest = 0.0  # [m/s]
 
@@ -115,7 +67,7 @@ class PieceCoverage:
             if piece is None or piece.place != place:
                 self._partly.pop(name, None)
                 at = [0.0, *accumulate(math.dist(a, b) for a, b in pairwise(stop.task.path))]
-                piece = _Piece(stop.task.path, place, at, 0.0, at[-1], stop.reversed)
+                piece = Piece(stop.task.path, place, at, 0.0, at[-1], stop.reversed)
                 piece.measure()
                 self.version += 1
             elif piece.path != stop.task.path or piece.reversed != stop.reversed:
@@ -126,7 +78,7 @@ class PieceCoverage:
             del self._pieces[name]
             self._partly.pop(name, None)
 
-    def _turn(self, piece: _Piece, stop: MissionStop) -> None:
+    def _turn(self, piece: Piece, stop: MissionStop) -> None:
         """Take another direction of flight, or of the path."""
         piece.commit()
         if piece.path != stop.task.path:  # the same points from the other end
@@ -151,24 +103,56 @@ class PieceCoverage:
         """Whether the vehicle is flying along the way of a task."""
         return task == self._under_way
 
-    def note_active(self, item: Item | None, in_mission: bool) -> None:
-        """Note the item being flown; the way of another one is left where the vehicle was."""
+    def note_active(self, item: Item | None, in_mission: bool,
+                    vehicle_now: Callable[[], float] = lambda: -math.inf) -> None:
+        """Note the item being flown; the way of another one is left where the vehicle was.
+
+        Args:
+            item: being flown; None: none, or not known.
+            in_mission: whether the vehicle is in mission mode.
+            vehicle_now: vehicle time [s].
+        """
         task = item.task if item is not None and in_mission and item.along else None
         if not in_mission:
             self._recent.clear()
-        if task == self._under_way:
+        piece = None if task is None else self._pieces.get(task)
+        if task == self._under_way and not (piece is not None and piece.gone):
             return
         before, self._under_way = self._under_way, task
-        if before is not None:
+        if before is not None and before != task:
             self.left.append(before)
             self._leave(self._ending)
             self._ending = before
         if not in_mission or task == self._ending:
             self._leave(self._ending)
-        piece = self._pieces.get(task or '')
-        if piece is not None and piece.seen is None:  # it may be on it for some seconds
+        if piece is not None:
+            self._begin(piece, vehicle_now)
+            self._partly[task or ''] = None
+
+    def _begin(self, piece: Piece, vehicle_now: Callable[[], float]) -> None:
+        """Begin to follow a way, on which the vehicle may be for some seconds."""
+        if piece.gone:
+            piece.gone, piece.seen, piece.off = False, None, None
+        piece.in_silence = False
+        if piece.seen is None:
             for sample in self._recent:
                 self._follow(piece, sample, sample.t, self._fastest)
+            if piece.off is not None:  # it may have come to it since, or it cannot
+                since, back = piece.off
+                piece.missed = back > self._corridor + _SLACK + (
+                    _MARGIN * self._fastest * max(vehicle_now() - since, 0.0))
+
+    def note_replaced(self, item: Item | None) -> None:
+        """Note another mission: what is flown from now on is not of a way left by it.
+
+        Args:
+            item: its first one.
+        """
+        for name in (self._under_way, self._ending):
+            piece = self._pieces.get(name or '')
+            if piece is not None and not (
+                    item is not None and item.along and item.task == name):
+                piece.gone = True
 
     def _leave(self, name: str | None) -> None:
         """Fly the rest of a way from where it was left."""
@@ -189,32 +173,34 @@ class PieceCoverage:
         if not 0.0 <= sample.t - before <= GAP:
             self._recent.clear()
         self._recent.append(sample)
-        for name in (self._under_way, self._ending):
+        for name in {self._under_way, self._ending, *self._restored}:
             piece = self._pieces.get(name or '')
-            if name is not None and piece is not None:
+            if piece is not None and not piece.gone:
                 self._follow(piece, sample, before, fastest)
-                if piece.flown >= _SHORTEST:
-                    self._partly[name] = None
+                piece.missed = piece.off is not None
 
-    def _follow(self, piece: _Piece, sample: PositionSample, before: float,
+    def _follow(self, piece: Piece, sample: PositionSample, before: float,
                 fastest: float) -> None:
         if piece.seen is None:
             piece.seen = min(before, sample.t) if math.isfinite(before) else sample.t
         since, back = piece.off or (piece.seen, 0.0)
         silent = sample.t - before > GAP
-        gap = max(sample.t - since, 0.0) if self.mission_known or not silent else 0.0
+        known = self.mission_known and not piece.missed
+        gap = max(sample.t - since, 0.0) if known or not silent else 0.0
         reach = max(_MARGIN * fastest * gap - back, 0.0) + _SLACK
         metres = self._metres(piece, sample.position, reach)
         if metres is not None:
             piece.flown, piece.seen, piece.off = max(piece.flown, metres), sample.t, None
-        elif gap > GAP and silent and (
+            piece.in_silence = False
+            return
+        if gap > GAP and silent and (
                 piece.way_at[-1] - piece.flown + math.dist(sample.position, piece.way[-1])
                 <= reach):
-            piece.flown, piece.seen, piece.off = piece.way_at[-1], sample.t, None
-        else:  # what it flies now it does not fly of the way
-            piece.off = sample.t, math.dist(sample.position, piece.next_point())
+            piece.in_silence = True
+        # what it flies now it does not fly of the way
+        piece.off = sample.t, math.dist(sample.position, piece.next_point())
 
-    def _metres(self, piece: _Piece, position: Point, reach: float) -> float | None:
+    def _metres(self, piece: Piece, position: Point, reach: float) -> float | None:
         """Where on its way the vehicle is [m]; None where it does not follow it."""
         low, high = piece.flown - _SLACK, piece.flown + reach
         first = max(bisect_right(piece.way_at, low) - 1, 0)
@@ -241,12 +227,27 @@ class PieceCoverage:
         if piece is None or math.isinf(self._sampled):
             return True
         left = piece.way_at[-1] - piece.flown
-        if left <= self._corridor + _SLACK:
+        if left <= self._corridor + _SLACK or piece.in_silence:
             return True
         # nothing was received since it was on its way
-        blind = self.mission_known and piece.seen is not None and self._sampled <= piece.seen
+        blind = self.mission_known and piece.seen is not None and (
+            self._sampled <= piece.seen and not piece.missed and not piece.gone)
+        left += piece.off[1] if piece.off is not None else 0.0
         return blind and left <= _SLACK + self._corridor + _MARGIN * fastest * max(
             0.0, vehicle_now - (piece.seen or 0.0))
+
+    def covered_before(self, task: str) -> bool:
+        """Whether the whole way of a task was flown that ended while no bridge ran.
+
+        Only one that was being flown when the previous run ended, by its file: where another
+        station has set the current item, what is before that was not flown.
+
+        Args:
+            task: id.
+        """
+        piece = self._pieces.get(task)
+        return piece is None or piece.in_silence or (
+            piece.way_at[-1] - piece.flown <= self._corridor + _SLACK)
 
     def forget(self, task: str) -> None:
         """Fly the whole way of a task again."""
@@ -254,7 +255,7 @@ class PieceCoverage:
         self._partly.pop(task, None)
         if piece is not None:
             piece.low, piece.high, piece.flown, piece.seen = 0.0, piece.at[-1], 0.0, None
-            piece.off = None
+            piece.off, piece.missed, piece.gone, piece.in_silence = None, False, False, False
             piece.measure()
             self.version += 1
 
@@ -272,16 +273,23 @@ class PieceCoverage:
         rows = ((name, self._pieces[name]) for name in self._partly)
         return tuple(PieceMark(
             name, *piece.path[0][:2], piece.place[2], round(piece.low, 2), round(piece.high, 2),
-            piece.reversed, _passed_points(piece)) for name, piece in rows)
+            piece.reversed, piece.passed_points(), self._state(name, piece))
+            for name, piece in rows)
+
+    def _state(self, name: str, piece: Piece) -> int:
+        if name not in (self._under_way, self._ending) or piece.gone or not self.mission_known:
+            return LEFT
+        return MISSED if piece.missed else UNDER_WAY
 
     def restore(self, marks: Iterable[PieceMark], stops: Iterable[MissionStop],
-                last: PositionSample | None) -> None:
+                samples: Sequence[PositionSample], fastest: float) -> None:
         """Continue with what the previous run of the bridge has stored, for tasks of a list.
 
         Args:
             marks: as stored.
             stops: of the list, which was set.
-            last: the last position that was stored; None: there is none.
+            samples: positions, those that were stored first; (): there are none.
+            fastest: [m/s] that it flies.
         """
         by_id = {stop.task.id: stop for stop in stops if stop.task.path}
         for mark in marks:
@@ -294,13 +302,19 @@ class PieceCoverage:
             piece.measure()
             piece.flown = mark.flown
             self._partly[mark.task] = None
-            if last is not None:
-                self._place(piece, last.position, last.t)
+            piece.missed = mark.state == MISSED
+            if mark.state == UNDER_WAY:
+                self._restored.add(mark.task)
+            if mark.state == UNDER_WAY and samples:
+                self._place(piece, samples[0].position, samples[0].t)
+                for before, sample in pairwise(samples):
+                    self._follow(piece, sample, before.t, fastest)
+                self._sampled = max(self._sampled, samples[-1].t)
             if piece.reversed != stop.reversed:
                 self._turn(piece, stop)
             self.version += 1
 
-    def _place(self, piece: _Piece, position: Point, t: float) -> None:
+    def _place(self, piece: Piece, position: Point, t: float) -> None:
         """Continue at a position on the leg after the points that were passed."""
         n = bisect_right(piece.way_at, piece.flown)
         end = piece.way_at[min(n, len(piece.way) - 1)]
@@ -317,16 +331,12 @@ class PieceCoverage:
             sample: of the vehicle; None: not known.
         """
         piece = self._pieces.get(item.task) if item is not None and item.along else None
-        if piece is None or item is None or piece.seen is not None or (
+        if piece is None or item is None or self.recorded or piece.seen is not None or (
                 piece.flown >= _SHORTEST or item.position is None):
             return
         place = item.position
         n = min(range(1, len(piece.way)), key=lambda k: math.dist(piece.way[k], place))
         piece.flown = piece.way_at[n - 1]
-        if sample is not None:
+        # set by another station, it flies to the item from elsewhere
+        if sample is not None and piece.begun_by(sample, n - 1) <= self._corridor:
             self._place(piece, sample.position, sample.t)
-
-
-def _passed_points(piece: _Piece) -> float:
-    """Metres to the last point of the way that was passed: what is stored changes rarely."""
-    return round(piece.way_at[max(bisect_right(piece.way_at, piece.flown) - 1, 0)], 2)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+LEFT, UNDER_WAY, MISSED = 0, 1, 2  # states of a piece
+
 
 class PieceMark(NamedTuple):
     """A piece that is partly flown, as it is stored for a restarted bridge."""
@@ -16,3 +18,4 @@ class PieceMark(NamedTuple):
     high: float  # [m] where that ends
     reversed: bool  # it is flown from its last point
     flown: float  # [m] of that rest
+    state: int = UNDER_WAY  # LEFT; UNDER_WAY: it was being flown; MISSED: it was seen off it

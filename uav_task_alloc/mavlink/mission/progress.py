@@ -154,6 +154,20 @@ class ProgressTable:
         return frozenset(item.task for claim in claims if not claim.skips
                          for item in claim.items) if claims else _NONE
 
+    @property
+    def passed_in_flight(self) -> tuple[frozenset[str], int]:
+        """Those of them passed in mission mode, and whether it has left that unseen since.
+
+        0: no, 1: yes, 2: perhaps, as nothing has shown the mode since.
+        """
+        moves = self._moves
+        claims = [claim for claim in moves.passed.claims if not claim.skips and (
+            claim.in_flight or moves.left_unseen_since(claim))]
+        if not claims:
+            return _NONE, 0
+        left = 1 if any(map(moves.left_unseen_since, claims)) else 2 * moves.may_have_left
+        return frozenset(item.task for claim in claims for item in claim.items), left
+
     def may_end(self, now: float) -> bool:
         """Whether the mission may be at its end, or was when it was just replaced."""
         return self._epoch.at_end or self._epochs.may_have_ended(now)
@@ -172,7 +186,8 @@ class ProgressTable:
             start: index of the one being flown; None: not known.
             now: steady time [s].
             read: whether they were found on board, since an unknown time.
-            since: vehicle time [s] from which it may have flown them; None: now.
+            since: vehicle time [s] from which it may have flown them; None: now, or not known
+                where they were found on board.
         """
         epoch = self._epoch
         epoch.number += 1
@@ -180,16 +195,18 @@ class ProgressTable:
             self._epochs.begin(PreviousEpoch(
                 epoch.items, epoch.since, self.positions.vehicle_time(now), self.may_end(now),
                 now + REPEAT_WINDOW, epoch.taken))
+            self.coverage.note_replaced(
+                items[start] if start is not None and start < len(items) else None)
         epoch.items, epoch.current = items, start
         self._reached.begin()
         self._moves.begin(None if read or start == len(items) else start, now)
         if read:
             self._moves.reports.last_frame = None
         known_since = self.path.newest if since is None else since
-        epoch.since = epoch.begin = -math.inf if read else known_since
+        epoch.since = epoch.begin = -math.inf if read and since is None else known_since
         epoch.taken = -math.inf if since is None else since
         epoch.taken_frame = math.inf if since is None else self._frames.newest
-        if read:  # along the way that a mission found on board is on
+        if read and since is None:  # along the way that a mission found on board is on
             self.coverage.continue_at(self.active, self.path.sample)
 
     def extend(self, items: tuple[Item, ...]) -> None:
@@ -223,14 +240,16 @@ class ProgressTable:
 
     def last_positions(self) -> tuple[PositionSample, ...]:
         """The newest position, after the one before a gap since the current item is flown."""
-        return self.path.last(self._epoch.since)
+        return self.path.last(min((self._epoch.since, *(
+            claim.since for claim in self._moves.passed.claims if not claim.skips))))
 
     def has_arrived(self, seq: int) -> bool:
         """Whether the vehicle was within the radius of an item since it is current."""
         if seq >= len(self.items):
             return False
-        since = self._moves.current_since(self.items[seq])
-        return self.positions.was_inside(self.items[seq], since)
+        item = self.items[seq]
+        return self.positions.was_inside(item, self._moves.current_since(item)) or any(
+            item is one for one in self._moves.passed.seen(in_order=True))
 
     def begin_set_current(self, seq: int) -> None:
         """Note that we are about to set the current item; it may be reported before the ack."""
@@ -322,7 +341,10 @@ class ProgressTable:
     def complete_offline(self, tasks: Iterable[Task]) -> None:
         """Complete tasks that were flown while no bridge was connected."""
         for task in tasks:
-            self._tasks.complete(task.id, place_of(task), while_offline=True)
+            if self.coverage.covered_before(task.id):
+                self._tasks.complete(task.id, place_of(task), while_offline=True)
+            elif task.id not in self._tasks:
+                self._tasks.uncovered.append(task.id)
 
     def credit(self, item: Item) -> None:
         """Complete the task of an item, of whichever epoch."""
@@ -360,8 +382,11 @@ class ProgressTable:
         return self.positions.near_one(item, other, when)
 
     def _note_active(self) -> None:
-        self.coverage.note_active(self.active, self._moves.in_mission)
+        self.coverage.note_active(self.active, self._moves.in_mission, self._vehicle_now)
+
+    def _vehicle_now(self) -> float:
+        return self.positions.vehicle_time(self._stepped_at)
 
     def _is_covered(self, task: str) -> bool:
         return self.coverage.covers(
-            task, self.positions.vehicle_time(self._stepped_at), self.path.fastest)
+            task, self._vehicle_now(), self.path.fastest)

@@ -92,7 +92,8 @@ class WantedMission:
         self._progress.coverage.set_listed(tasks.stops)
         if first:
             self._progress.coverage.restore(
-                self.stored_pieces, tasks.stops, self._progress.path.sample)
+                self.stored_pieces, tasks.stops, self._progress.path.samples,
+                self._progress.path.fastest)
         self._progress.set_listed_tasks(listed)
         ids, completed = {task.id for task in listed}, self._progress.completed.keys()
         self._dropped = (self._dropped | (completed - ids)) & completed

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A way of the list of one vehicle: the part of it that is left, and how far that is flown."""
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
+
+from uav_task_alloc.geometry.polyline import point_at
+from uav_task_alloc.mavlink.mission.flown_path import PositionSample
+from uav_task_alloc.model import Point
+
+_SHORTEST = 1.0  # [m] of a flown part or of a rest
+_COURSE_SPEED = 1.0  # [m/s] above which a vehicle has a course
+
+
+@dataclass(slots=True)
+class Piece:
+    """A way of the list, in metres from the first point of its path."""
+
+    path: tuple[Point, ...]
+    place: Point
+    at: list[float]  # [m] of each point
+    low: float
+    high: float
+    reversed: bool = False
+    flown: float = 0.0  # [m] of the part between `low` and `high`, in the direction of flight
+    seen: float | None = None  # vehicle time [s] of the last position on it
+    off: tuple[float, float] | None = None  # vehicle time [s], [m] to go back: seen off it since
+    missed: bool = False  # seen off it while its item was current: silence proves nothing
+    gone: bool = False  # another mission was taken, in which it is not flown on
+    in_silence: bool = False  # its end can have been flown in silence, if it was passed
+    way: list[Point] = field(default_factory=list)  # that part in the direction of flight
+    way_at: list[float] = field(default_factory=list)  # [m] of each of its points
+
+    def measure(self) -> None:
+        """Cut the part that is left out of the path."""
+        inner = [p for p, at in zip(self.path, self.at, strict=True)
+                 if self.low < at < self.high]
+        self.way = [self.point(self.low), *inner, self.point(self.high)]
+        if self.reversed:
+            self.way.reverse()
+        self.way_at = [0.0, *accumulate(math.dist(a, b) for a, b in pairwise(self.way))]
+
+    def point(self, metres: float) -> Point:
+        """The place at so many metres from the first point of its path."""
+        n = min(max(bisect_right(self.at, metres) - 1, 0), len(self.path) - 2)
+        length = self.at[n + 1] - self.at[n]
+        if metres <= self.at[0] or metres >= self.at[-1] or length <= 0.0:
+            return self.path[0 if metres <= self.at[0] else -1 if metres >= self.at[-1] else n]
+        x, y, z = point_at(self.path[n], self.path[n + 1], (metres - self.at[n]) / length)
+        return x, y, z
+
+    def next_point(self) -> Point:
+        """The end of the flown part."""
+        return self.point(self.high - self.flown if self.reversed else self.low + self.flown)
+
+    def passed_points(self) -> float:
+        """Metres to the last point of the way that was passed: what is stored changes rarely."""
+        return round(self.way_at[max(bisect_right(self.way_at, self.flown) - 1, 0)], 2)
+
+    def begun_by(self, sample: PositionSample, leg: int) -> float:
+        """Return how far [m] from the beginning of a leg the vehicle was, by its course.
+
+        Args:
+            sample: of the vehicle.
+            leg: index of the point of the way at which it begins.
+        """
+        start, speed = self.way[leg], math.hypot(*sample.velocity)
+        away = math.dist(start, sample.position)
+        if not speed > _COURSE_SPEED:
+            return away
+        x, y, z = (p - v / speed * away for p, v in zip(
+            sample.position, sample.velocity, strict=True))
+        return math.dist(start, (x, y, z))
+
+    def commit(self) -> bool:
+        """Leave out the flown part from now on; whether there is one."""
+        if self.flown < _SHORTEST:
+            self.flown, self.seen, self.off = 0.0, None, None
+            return False
+        left = max(self.high - self.low - self.flown, _SHORTEST)
+        if self.reversed:
+            self.high = self.low + left
+        else:
+            self.low = self.high - left
+        self.flown, self.seen, self.off = 0.0, None, None
+        self.measure()
+        return True
