@@ -431,3 +431,31 @@ def test_a_task_passed_in_a_cut_in_which_the_mission_was_left_survives_a_kill(ki
     bench.run(limit=8.0)
     bench.hand_over()
     flown_once_each(bench, 'ABC')
+
+
+@BOTH
+@pytest.mark.parametrize('place', ['after', 'at'])
+def test_tasks_passed_at_once_survive_a_kill_before_they_are_judged(kind, place):
+    bench = flying(kind, 'ABC')
+    bench.run(lambda: distance(bench, AT_A) < 45.0)
+    lost = []
+    if place == 'after':
+        bench.line.cut = True
+    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: True)
+    drop_messages(bench, 'down', 'MISSION_CURRENT', lambda m: not lost)
+    assert bench.run(lambda: places(bench) == ['A', 'B'], 60.0)
+    bench.run(limit=2.0)
+    bench.line.cut = False
+    lost.append(True)
+    assert bench.run(lambda: bench.onboard().progress.pending, 5.0)
+    bench.run(limit=2.0)
+    bench.kill_and_restart(0.0)
+    bench.line.tampers.clear()
+    bench.vehicles[1].failsafe('ekf', MODES[kind].land)
+    bench.run(limit=4.0)
+    bench.vehicles[1].failsafe_over()
+    bench.assign(task_list('ABC', 2))
+    assert bench.run(lambda: not bench.executor().telemetry.airborne, 30.0)
+    bench.run(limit=8.0)
+    bench.hand_over()
+    flown_once_each(bench, 'ABC')

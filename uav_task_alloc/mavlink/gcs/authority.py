@@ -223,11 +223,11 @@ class AuthorityRecord:
     mission: int | None = None  # checksum of the items on board
     current: int | None = None  # index of the item being flown, home not counted
     arrived: bool = False  # the vehicle was seen at that item
-    # index after the items from `current` on that it has passed in order, which are not known to
-    # be flown, and whether it has left mission mode unseen since: 0 no, 1 yes, 2 perhaps
+    # items passed and still to be judged: index of the first one and after the last one, whether
+    # it has left mission mode unseen since (0 no, 1 yes, 2 perhaps), indices where it was seen
     passed: tuple[int, ...] = ()
     uploading: tuple[int, ...] = ()  # checksum of a mission being uploaded, index of its start
-    # vehicle time [s], position [m] and velocity [m/s], both ENU, of one or two recent positions
+    # vehicle time [s], position [m] and velocity [m/s], both ENU, of one to three recent positions
     seen: tuple[float, ...] = ()
     landed_battery: float | None = None  # 0..1, at its own landing, while it may start again
     pieces: tuple[PieceMark, ...] = ()  # that are partly flown

@@ -104,12 +104,14 @@ class MissionEvidence:
     def passed(self) -> tuple[int, ...]:
         """`AuthorityRecord.passed`; () where none is open."""
         progress = self._onboard.progress
-        (tasks, left), held = progress.passed_in_flight, progress.items
+        tasks, left = progress.passed_in_flight
         if not tasks or progress.current is None:
             return ()
-        end = max((n + 1 for n, item in enumerate(held[:progress.current])
-                   if item.task in tasks), default=0)
-        return (end, left) if end else ()
+        seen = progress.seen_passed()
+        held = [(n, item) for n, item in enumerate(progress.items[:progress.current])
+                if item.task in tasks]
+        return () if not held else (held[0][0], held[-1][0] + 1, left, *(
+            n for n, item in held if item.completes and item.task in seen))
 
     def pieces(self) -> tuple[PieceMark, ...]:
         """The tasks whose ways are partly flown."""

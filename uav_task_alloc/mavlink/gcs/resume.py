@@ -223,15 +223,13 @@ class Resume:
 
     def _credit_passed(self, held: tuple[Item, ...], now: float) -> None:
         """Credit what the previous run has seen passed and had still to judge."""
-        mission, recorded, arrived = self.recorded
-        if len(self.passed) != 2 or mission != checksum(held) or recorded is None:
+        if len(self.passed) < 3 or self.recorded[0] != checksum(held):
             return
-        flown = {recorded} if arrived else set()
-        end, left = self.passed
+        first, end, left, *seen = self.passed
         left &= 1 if self._telemetry.mode is ModeFunction.MISSION else 3
-        flown |= flown_in_gap(self._placed(held), recorded, end, self._seen, bool(left),
-                              self._home_of(held))
-        passed = tuple(held[n] for n in sorted(flown))
+        flown = flown_in_gap(self._placed(held), first, min(end, len(held)), self._seen[:2],
+                             bool(left), self._home_of(held)).union(seen)
+        passed = tuple(held[n] for n in sorted(flown) if n < len(held))
         self._flown, self._reached = self._flown + passed, self._reached + passed
         self._until = now + MAX_AGE if passed else self._until
 
@@ -268,7 +266,7 @@ class Resume:
             current, when = len(held), now
         self._old, self._until = held[:recorded], now + MAX_AGE
         # what was passed before is judged by the positions of before
-        begin = min(max(recorded, *self.passed[:1], 0), current)
+        begin = min(max(recorded, *self.passed[1:2], 0), current)
         flown = self._flown_since(held, begin, current, when)
         if arrived and current > recorded:
             flown |= {recorded}

@@ -67,7 +67,7 @@ class FlownPath:
         return tuple(self._samples)
 
     def last(self, since: float) -> tuple[PositionSample, ...]:
-        """The newest sample, after the one before the latest gap.
+        """The newest sample, after those before and after the latest gap.
 
         Args:
             since: vehicle time [s]; earlier gaps do not count.
@@ -76,7 +76,7 @@ class FlownPath:
             if self._samples[n].t < since:
                 break
             if self._samples[n].t - self._samples[n - 1].t > GAP:
-                return self._samples[n - 1], self._samples[-1]
+                return tuple(dict.fromkeys((*self._samples[n - 1:n + 1], self._samples[-1])))
         return tuple(self._samples[-1:])
 
     def add(self, sample: PositionSample) -> None:

@@ -73,15 +73,10 @@ class PassedItems:
         self._claims = [replace(claim, frames=None) if any(item is one for one in claim.items)
                         else claim for claim in self._claims]
 
-    def seen(self, in_order: bool = False) -> tuple[Item, ...]:
-        """Items of open claims at which the vehicle was seen, where nothing more will come.
-
-        Args:
-            in_order: only those that were passed one by one, as a mission is flown.
-        """
+    def seen(self) -> tuple[Item, ...]:
+        """Items of open claims at which the vehicle was seen, where nothing more will come."""
         return tuple(item for claim in self._claims for item in claim.items
-                     if not (in_order and claim.skips) and (
-                         self._visit(item, claim) is Visit.YES or self._approached(item, claim)))
+                     if self._visit(item, claim) is Visit.YES or self._approached(item, claim))
 
     def clear(self) -> None:
         """Drop all claims: the mission on board is unknown."""

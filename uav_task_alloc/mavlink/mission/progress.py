@@ -156,17 +156,21 @@ class ProgressTable:
 
     @property
     def passed_in_flight(self) -> tuple[frozenset[str], int]:
-        """Those of them passed in mission mode, and whether it has left that unseen since.
+        """The pending tasks passed in mission mode, and whether it has left that unseen since.
 
         0: no, 1: yes, 2: perhaps, as nothing has shown the mode since.
         """
         moves = self._moves
-        claims = [claim for claim in moves.passed.claims if not claim.skips and (
-            claim.in_flight or moves.left_unseen_since(claim))]
+        claims = [claim for claim in moves.passed.claims
+                  if claim.in_flight or moves.left_unseen_since(claim)]
         if not claims:
             return _NONE, 0
         left = 1 if any(map(moves.left_unseen_since, claims)) else 2 * moves.may_have_left
         return frozenset(item.task for claim in claims for item in claim.items), left
+
+    def seen_passed(self) -> frozenset[str]:
+        """Return the pending tasks at which the vehicle was seen."""
+        return frozenset(item.task for item in self._moves.passed.seen())
 
     def may_end(self, now: float) -> bool:
         """Whether the mission may be at its end, or was when it was just replaced."""
@@ -239,17 +243,16 @@ class ProgressTable:
             self.coverage.add_position(sample, self.path.fastest)
 
     def last_positions(self) -> tuple[PositionSample, ...]:
-        """The newest position, after the one before a gap since the current item is flown."""
+        """The newest position, after those around a gap since the current item is flown."""
         return self.path.last(min((self._epoch.since, *(
-            claim.since for claim in self._moves.passed.claims if not claim.skips))))
+            claim.since for claim in self._moves.passed.claims))))
 
     def has_arrived(self, seq: int) -> bool:
         """Whether the vehicle was within the radius of an item since it is current."""
         if seq >= len(self.items):
             return False
-        item = self.items[seq]
-        return self.positions.was_inside(item, self._moves.current_since(item)) or any(
-            item is one for one in self._moves.passed.seen(in_order=True))
+        since = self._moves.current_since(self.items[seq])
+        return self.positions.was_inside(self.items[seq], since)
 
     def begin_set_current(self, seq: int) -> None:
         """Note that we are about to set the current item; it may be reported before the ack."""
