@@ -9,6 +9,7 @@ from flight_evidence import DeliveredEvidence
 from flight_world import BRIDGE, World
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic, mode_class
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.sim.config import TruthEvent
@@ -238,19 +239,19 @@ class Judge:
 
     def _progress(self) -> None:
         """Stuck: HELD by the bridge, the link is good, and the vehicle does not move."""
-        world, state = self.world, self.world.state
+        world = self.world
         flight = world.vehicle.flight
         if math.hypot(*flight.body.velocity) > 0.3 or (
                 flight.track is not None and flight.track.hold > 0.0):
             self._moved_at = world.now
         wants = world.tasks is not None and any(
             stop.task.id not in self.completed for stop in world.tasks.stops)
-        ready = (state is not None and state.authority.name == 'HELD' and wants
+        ready = (world.authority is AuthorityState.HELD and wants
                  and world.now >= world.link.cut_until and not self.failing)
         if not ready or world.tasks is not self._listed:
             self._stuck_since, self._listed = world.now, world.tasks
         if world.now - max(self._stuck_since, self._moved_at) > STUCK:
-            self._fault('held_forever', f'{flight.mode.name}, {state}')
+            self._fault('held_forever', f'{flight.mode.name}, {world.state}')
             self._moved_at = math.inf  # once a flight
 
     def _fault(self, kind: str, text: str) -> None:

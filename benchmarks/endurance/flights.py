@@ -229,9 +229,12 @@ class Flight:
 
     def operate(self) -> None:
         """Hand the aircraft back where the bridge reports that it does not hold it."""
-        world, state = self.world, self.world.state
-        if not self.gives_back or state is None or world.now < max(
+        world = self.world
+        if not self.gives_back or world.now < max(
                 min(self.back_at, QUIET + 20.0), world.link.cut_until + 4.0):
+            return
+        state = world.state
+        if state is None:
             return
         self.back_at = world.now + 3.0
         if (

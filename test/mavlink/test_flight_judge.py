@@ -13,6 +13,7 @@ from flight_evidence import DeliveredEvidence
 from flight_judge import OURS, Judge
 from flights import Flight
 
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
@@ -157,7 +158,7 @@ def test_a_disarming_is_no_news_where_no_frame_has_shown_it_armed(shown, overrid
         booted=0.0, mode=FlightMode.HOLD, items=[], landed=True, track=None,
         system_status=d.MAV_STATE_STANDBY)
     world = SimpleNamespace(now=0.0, vehicle=SimpleNamespace(flight=flight), events=[],
-                            tasks=None, state=None)
+                            tasks=None, state=None, authority=AuthorityState.UNKNOWN)
     judge = Judge(world, 'px4', {})
     for now, event, frame, sent in (
             (1.0, ('armed', OURS), shown, None), (1.1, ('disarmed', 'pilot'), None, None),
