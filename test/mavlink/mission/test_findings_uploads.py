@@ -154,13 +154,13 @@ def test_a_complete_mission_that_begins_again_by_itself_is_stopped(kind):
 
 
 @BOTH
-@pytest.mark.parametrize('seconds', [0.0, 0.3])
-def test_an_item_skipped_just_before_the_bridge_is_killed_is_flown_later(kind, seconds):
+@pytest.mark.parametrize(('seconds', 'dead'), [(0.0, 0.0), (0.3, 0.0), (0.6, 12.0)])
+def test_an_item_skipped_just_before_the_bridge_is_killed_is_flown_later(kind, seconds, dead):
     bench = flying(kind, 'ABC')
     bench.run(lambda: distance(bench, AT_A) < 60.0)
     set_current(bench, 1)
     bench.run(limit=seconds)
-    bench.kill_and_restart(0.0)
+    bench.kill_and_restart(dead)
     bench.assign(task_list('ABC', 2))
     flown_once_each(bench, 'ABC')
 
