@@ -21,7 +21,7 @@ from urllib.parse import quote
 from uav_task_alloc.atomic_files import replace_file, sync_folder
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState, TaskMark
-from uav_task_alloc.mavlink.mission.piece_mark import LEFT, MISSED, PieceMark
+from uav_task_alloc.mavlink.mission.piece_mark import PART_FLOWN, PART_MISSED, PieceMark
 
 _POSITION, _POSITION_SUFFIX = 'seen', '.position'  # field with a file of its own
 _FORMAT = 1  # of the file; one of a newer format is refused
@@ -249,7 +249,7 @@ def _are_pieces(value: Any) -> bool:
         isinstance(mark, list) and len(mark) in (8, 9) and _is_text(mark[0])
         and all(map(_is_time, (*mark[1:6], mark[7]))) and isinstance(mark[6], bool)
         and 0.0 <= mark[4] < mark[5] and mark[7] >= 0.0
-        and all(type(state) is int and LEFT <= state <= MISSED for state in mark[8:])
+        and all(type(state) is int and PART_FLOWN <= state <= PART_MISSED for state in mark[8:])
         for mark in value)
 
 

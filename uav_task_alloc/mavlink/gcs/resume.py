@@ -184,9 +184,7 @@ class Resume:
         if self.located or not held or telemetry.current is None:
             self.located = self.located or not held
             return
-        self.located = True
-        self._missions = (*self._missions[-_MAX_MISSIONS:], held)
-        self._credit_passed(held, now)
+        self._begin(held, now)
         replaced = self._find_upload(held)
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
@@ -221,8 +219,9 @@ class Resume:
         if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
             self._until = now + MAX_AGE
 
-    def _credit_passed(self, held: tuple[Item, ...], now: float) -> None:
+    def _begin(self, held: tuple[Item, ...], now: float) -> None:
         """Credit what the previous run has seen passed and had still to judge."""
+        self.located, self._missions = True, (*self._missions[-_MAX_MISSIONS:], held)
         if len(self.passed) < 3 or self.recorded[0] != checksum(held):
             return
         first, end, left, *seen = self.passed

@@ -17,7 +17,12 @@ from uav_task_alloc.geometry.polyline import nearest_on_segment, segment_fractio
 from uav_task_alloc.mavlink.mission.flown_path import GAP, PositionSample
 from uav_task_alloc.mavlink.mission.item import Item
 from uav_task_alloc.mavlink.mission.piece import Piece
-from uav_task_alloc.mavlink.mission.piece_mark import LEFT, MISSED, UNDER_WAY, PieceMark
+from uav_task_alloc.mavlink.mission.piece_mark import (
+    PART_FLOWN,
+    PART_MISSED,
+    PART_UNDER_WAY,
+    PieceMark,
+)
 from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.mavlink.mission.task_list import MissionStop
 from uav_task_alloc.model import Point
@@ -278,8 +283,8 @@ class PieceCoverage:
 
     def _state(self, name: str, piece: Piece) -> int:
         if name not in (self._under_way, self._ending) or piece.gone or not self.mission_known:
-            return LEFT
-        return MISSED if piece.missed else UNDER_WAY
+            return PART_FLOWN
+        return PART_MISSED if piece.missed else PART_UNDER_WAY
 
     def restore(self, marks: Iterable[PieceMark], stops: Iterable[MissionStop],
                 samples: Sequence[PositionSample], fastest: float) -> None:
@@ -302,10 +307,10 @@ class PieceCoverage:
             piece.measure()
             piece.flown = mark.flown
             self._partly[mark.task] = None
-            piece.missed = mark.state == MISSED
-            if mark.state == UNDER_WAY:
+            piece.missed = mark.state == PART_MISSED
+            if mark.state == PART_UNDER_WAY:
                 self._restored.add(mark.task)
-            if mark.state == UNDER_WAY and samples:
+            if mark.state == PART_UNDER_WAY and samples:
                 self._place(piece, samples[0].position, samples[0].t)
                 for before, sample in pairwise(samples):
                     self._follow(piece, sample, before.t, fastest)

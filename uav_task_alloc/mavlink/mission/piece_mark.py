@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-LEFT, UNDER_WAY, MISSED = 0, 1, 2  # states of a piece
+PART_FLOWN, PART_UNDER_WAY, PART_MISSED = 0, 1, 2  # states of a piece that is partly flown
 
 
 class PieceMark(NamedTuple):
@@ -18,4 +18,4 @@ class PieceMark(NamedTuple):
     high: float  # [m] where that ends
     reversed: bool  # it is flown from its last point
     flown: float  # [m] of that rest
-    state: int = UNDER_WAY  # LEFT; UNDER_WAY: it was being flown; MISSED: it was seen off it
+    state: int = PART_UNDER_WAY  # whether it was being flown, or seen off it
