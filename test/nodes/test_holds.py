@@ -33,9 +33,17 @@ def test_a_hold_is_flown_by_both_autopilots_and_outlives_a_kill_of_the_bridge(sk
     probe = sky.probe
     for n in (1, 2):
         sky.send(n, 1, range(1, 9))
-    probe.until(lambda: all(mode == S.ON_MISSION for mode in modes(sky).values()), 90.0)
-    for n, publisher in sky.holds.items():
-        publisher.publish(m.UavHold(uav_id=f'uav_{n}', hold=True, reason='order o1 of ann'))
+    held = set()
+
+    def hold_those_on_their_way():  # at once: the other one may take off much later
+        for n, publisher in sky.holds.items():
+            if n not in held and modes(sky)[n] == S.ON_MISSION:
+                held.add(n)
+                publisher.publish(
+                    m.UavHold(uav_id=f'uav_{n}', hold=True, reason='order o1 of ann'))
+        return held == {1, 2}
+
+    probe.until(hold_those_on_their_way, 90.0)
     probe.until(lambda: all(mode == S.HOLD for mode in modes(sky).values()), 60.0)
     for publisher in sky.holds.values():  # as if the allocator were down, too
         probe.node.destroy_publisher(publisher)
