@@ -148,3 +148,13 @@ def test_points_after_the_last_task_of_a_list_that_holds_are_not_flown():
     with_task = replace(task_list('A'), end_via=WAY)
     assert mission_items(with_task, PX4.rules, ORIGIN) == mission_items(
         task_list('A'), PX4.rules, ORIGIN)
+
+
+@BOTH
+def test_such_points_are_not_flown_once_its_tasks_are_flown_either(kind):
+    bench = FlightBench(kind).discover()
+    bench.assign(replace(task_list('A'), end_via=WAY))
+    assert bench.run(lambda: bench.completed() == ['A'])
+    place = bench.vehicles[1].flight.body.position
+    bench.run(limit=20.0)
+    assert off(bench, place) < 10.0

@@ -74,7 +74,8 @@ class TaskList:
     def without(self, tasks: Iterable[str]) -> TaskList:
         """Return the list without the tasks of these ids."""
         removed = set(tasks)
-        return replace(self, stops=tuple(s for s in self.stops if s.task.id not in removed))
+        return replace(self, stops=tuple(s for s in self.stops if s.task.id not in removed),
+                       end_via=self.tail)
 
     def find(self, task_id: str) -> Task | None:
         """Return the task of that id, None where the list has none."""
