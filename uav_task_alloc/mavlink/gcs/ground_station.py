@@ -217,11 +217,11 @@ class GroundStation:
         """
         executors = [session.executor for session in self.sessions.values()]
         reading = self._read_until is not None and now < self._read_until
-        unread = [executor if reading and not executor.onboard.resume.located
-                  and not executor.telemetry.stale(now) else None for executor in executors]
+        unread = [executor for executor in executors if reading
+                  and not executor.onboard.resume.located and not executor.telemetry.stale(now)]
         for executor in executors:
             executor.onboard.list.perhaps_flown = frozenset(
-                task for other in unread if other is not None and other is not executor
+                task for other in unread if other is not executor
                 for task in other.onboard.resume.ahead)
 
     def _drop_flown_by_others(self, now: float) -> None:

@@ -212,7 +212,7 @@ class ReportsDuringUpload:
         waiting = [each for each in self._reached if (each.frame, each.last_frame)
                    not in self._judged and now - self._first_at(each) >= MAX_MESSAGE_DELAY]
         if waiting and uploaded is not None:
+            judged = {*self._judged, *((each.frame, each.last_frame) for each in waiting)}
             kept, self._reached = self._reached, waiting
             self._credit_reached(uploaded)
-            self._judged.update((each.frame, each.last_frame) for each in waiting)
-            self._reached = kept
+            self._reached, self._judged = kept, judged
