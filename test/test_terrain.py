@@ -106,6 +106,15 @@ def test_a_way_above_ground_follows_it():
     assert len(way) < 300
 
 
+@pytest.mark.parametrize('far', [math.inf, math.nan])
+def test_a_leg_to_where_the_projection_has_no_place_is_refused(far):
+    ground = Terrain(mountain(), lambda longitude, latitude: (
+        np.where(longitude < 8.02, (longitude - WEST) / STEP, far), (NORTH - latitude) / STEP),
+        ORIGIN)
+    with pytest.raises(TerrainError, match='it does not reach to'):
+        ground.least_clearance((0.0, 0.0, 900.0), (9000.0, 0.0, 900.0))
+
+
 def test_what_is_below_ground_is_refused():
     with pytest.raises(InvalidValue, match=r'task t: position = -900\.0: expected at least'):
         check_above(terrain(), 'task t: position', [(0.0, 0.0, -900.0)])
@@ -114,6 +123,8 @@ def test_what_is_below_ground_is_refused():
 def test_the_end_of_the_data_is_named():
     with pytest.raises(TerrainError, match=r'terrain: it does not reach to \(0, 0\) to \(9000'):
         terrain().least_clearance((0.0, 0.0, 900.0), (9000.0, 0.0, 900.0))
+    with pytest.raises(TerrainError, match='it does not reach to'):
+        terrain().least_clearance((0.0, 0.0, 900.0), (1e8, 0.0, 900.0))
     heights = mountain()
     heights[100:140, 100:140] = np.nan
     with pytest.raises(TerrainError, match='it has no data near'):

@@ -18,6 +18,7 @@ from uav_task_alloc.model import Point
 
 _Floats = NDArray[np.float64]
 _CHUNK = 100.0  # [m] of a leg that is straight in the grid: the earth's curve over it is 0.2 mm
+_MANY = 1000  # chunks: 100 km
 _SLACK = 0.05  # [m] more than asked for, for that and for rounding
 _MOST_POINTS = 200  # that are added to a leg
 _LARGEST = 200_000_000  # nodes of a raster
@@ -101,9 +102,12 @@ class Terrain:
             TerrainError: the leg leaves the raster, or crosses cells without data.
         """
         parts = max(1, math.ceil(math.dist(a, b) / _CHUNK))
+        if parts > _MANY:
+            self.above_ground([a, b])  # far outside is found at once
         shares = np.linspace(0.0, 1.0, parts + 1)
         line = np.array(a) + shares[:, None] * (np.array(b) - np.array(a))
         u, v, altitude = self._grid(line)
+        self._check_inside(u, v, line)
         cuts = np.unique(np.concatenate([shares, *(
             _crossings(values, shares) for values in (u, v))]))
         middles = (cuts[1:] + cuts[:-1]) / 2  # three values make a quadratic function
@@ -127,11 +131,8 @@ class Terrain:
     def _surface(self, u: _Floats, v: _Floats, points: _Floats, column: _Floats | None = None,
                  row: _Floats | None = None) -> _Floats:
         """Heights AMSL at positions in the grid, of the cells given or those around them."""
+        self._check_inside(u, v, points)
         rows, columns = self._heights.shape
-        inside = (u >= -1e-6) & (v >= -1e-6) & (u <= columns - 1 + 1e-6) & (v <= rows - 1 + 1e-6)
-        if not inside.all():
-            raise TerrainError(f'{self.name}: it does not reach to {_spots(points)}: expected a '
-                               'raster that covers all UAVs, tasks and the ways between')
         i = np.clip(np.floor(u) if column is None else column, 0, columns - 2).astype(np.int64)
         j = np.clip(np.floor(v) if row is None else row, 0, rows - 2).astype(np.int64)
         x, y, h = u - i, v - j, self._heights
@@ -141,6 +142,14 @@ class Terrain:
             raise TerrainError(f'{self.name}: it has no data near {_spots(points)}: expected '
                                'heights everywhere on the way')
         return found
+
+    def _check_inside(self, u: _Floats, v: _Floats, points: _Floats) -> None:
+        """Check positions in the grid, which may be infinite. Raises TerrainError."""
+        rows, columns = self._heights.shape
+        inside = (u >= -1e-6) & (v >= -1e-6) & (u <= columns - 1 + 1e-6) & (v <= rows - 1 + 1e-6)
+        if not inside.all():
+            raise TerrainError(f'{self.name}: it does not reach to {_spots(points)}: expected a '
+                               'raster that covers all UAVs, tasks and the ways between')
 
     def lifted(self, a: Point, b: Point, clearance: float) -> tuple[Point, ...]:
         """Return points between two ends by which a leg keeps clear of the ground.
