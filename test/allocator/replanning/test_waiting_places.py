@@ -304,6 +304,26 @@ def test_the_demand_is_the_same_after_a_restart_and_follows_step_by_step():
     assert steps.weight(True, 1200.0) == pytest.approx(whole.weight(True, 1200.0), abs=1e-15)
 
 
+def test_what_is_forgotten_is_not_learnt_though_as_much_was_announced_since():
+    seen, learnt = SeenTasks(), LearntDemand()
+    seen.add(Task('a', (0.0, 0.0, 0.0)), 1.0)
+    learnt.follow(seen, AllocatorParams())
+    seen.forget()
+    for k in range(2):
+        seen.add(Task(f'b{k}', (10.0, 10.0, 0.0)), 2.0)
+    learnt.follow(seen, AllocatorParams())
+    assert [each.at for each in learnt.demand.seen] == [2.0, 2.0]
+
+
+def test_an_area_that_is_no_longer_given_is_around_the_tasks_at_once():
+    seen, learnt = SeenTasks(), LearntDemand()
+    seen.add(Task('a', (0.0, 0.0, 0.0)), 1.0)
+    learnt.follow(seen, AllocatorParams(anticipate_area=AREA))
+    assert learnt.area == AREA
+    learnt.follow(seen, AllocatorParams())
+    assert learnt.area == area_around(seen.seen)
+
+
 def test_the_area_of_work_holds_all_tasks_and_changes_seldom():
     rng = np.random.default_rng(5)
     seen, areas = [], []

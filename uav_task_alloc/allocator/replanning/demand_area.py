@@ -58,6 +58,7 @@ class LearntDemand:
         self.distance: _Floats = np.zeros((0, 0))
         self.area: Area | None = None
         self._version, self._count = -1, 0
+        self._basis: object = None  # the area that is given, and how often all was forgotten
 
     def follow(self, seen: SeenTasks, params: AllocatorParams) -> None:
         """Learn what was announced since the last call.
@@ -68,18 +69,20 @@ class LearntDemand:
         """
         fixed = params.anticipate_area
         given = (fixed[0], fixed[1], fixed[2], fixed[3]) if fixed else None
-        if seen.version == self._version and (given is None or given == self.area):
+        basis = given, seen.forgotten
+        if (seen.version, basis) == (self._version, self._basis):
             return
         rows = seen.seen
         area = given or area_around(rows)
         new = rows[len(rows) - (seen.version - self._version):]
-        if area != self.area or self.demand is None or len(rows) != self._count + len(new):
+        if (area != self.area or self.demand is None or basis != self._basis
+                or len(rows) != self._count + len(new)):
             self._begin(area)
             new = rows
         if self.demand is not None:
             for row in new:
                 self.demand.add(Observation(*row))
-        self._version, self._count = seen.version, len(rows)
+        self._version, self._count, self._basis = seen.version, len(rows), basis
 
     def _begin(self, area: Area | None) -> None:
         """Begin without an announcement."""

@@ -31,7 +31,7 @@ class SeenTasks:
                  wanted: Callable[[], bool] = lambda: True) -> None:
         self.blocks = {str(number): list(rows) for number, rows in sorted(saved)}
         self.unsaved: set[str] = set()  # numbers of blocks that are not on disk
-        self.version = 0  # changes with each announcement
+        self.version = self.forgotten = 0  # changes with each announcement; how often all were
         self._wanted = wanted
         self._next = max((int(number) for number in self.blocks), default=-1) + 1
 
@@ -69,6 +69,7 @@ class SeenTasks:
         self.unsaved.update(self.blocks)
         self.blocks.clear()
         self.version += 1
+        self.forgotten += 1
         return count
 
 
