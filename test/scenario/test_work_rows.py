@@ -42,6 +42,21 @@ def test_a_line_in_degrees_has_its_heights_above_the_origin():
     assert timed.work.path[0] == pytest.approx((30.6, 28.7, 30.0), abs=0.1)
 
 
+@pytest.mark.parametrize('row', [
+    '{id: p, latitude: 47.5, longitude: 8.546, altitude: 30, vertical: terrain}',
+    '{id: o, kind: orbit, radius: 9, latitude: 47.5, longitude: 8.546, altitude: 30, '
+    'vertical: terrain}',
+    '{id: l, kind: line, vertical: terrain, path: [{latitude: 47.5, longitude: 8.546, '
+    'altitude: 30}, {latitude: 47.5, longitude: 8.548, altitude: 30}]}',
+    '{id: a, kind: area, vertical: terrain, altitude: 30, strip_width: 20, path: [{latitude: '
+    '47.5, longitude: 8.546}, {latitude: 47.5, longitude: 8.548}, {latitude: 47.501, longitude: '
+    '8.548}]}'])
+def test_heights_above_the_ground_do_not_depend_on_the_distance_from_the_origin(row):
+    timed = read(row)
+    assert timed.task.position[2] == 30.0
+    assert {point[2] for point in timed.whole.path} <= {30.0}
+
+
 def test_an_orbit_and_a_point_have_positions():
     timed = read('{id: o, kind: orbit, position: [1, 2, 30], radius: 40, turns: -2}')
     assert (timed.work.radius, timed.work.turns, timed.task.position) == (40, -2, (1, 2, 30))

@@ -167,7 +167,7 @@ def _position(row: YamlRow, origin: Origin) -> Point:
     for key in GEODETIC:
         if row[key] is None:
             raise row.refuse(key, 'all three of latitude, longitude, altitude')
-    return from_degrees(row, origin)
+    return from_degrees(row, origin, above_ground=row.values.get('vertical') == 'terrain')
 
 
 def _zone(row: YamlRow, origin: Origin) -> TimedZone:

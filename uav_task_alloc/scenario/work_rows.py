@@ -18,13 +18,16 @@ _FARTHEST = 500e3  # [m] from the origin: farther out, degrees or origin are wro
 _MILLIMETRES = 'sensor_width', 'sensor_height', 'focal_length'
 
 
-def from_degrees(row: YamlRow, origin: Origin, altitude: float | None = None) -> Point:
+def from_degrees(row: YamlRow, origin: Origin, altitude: float | None = None,
+                 above_ground: bool = False) -> Point:
     """Return ENU [m] of the latitude and longitude of a row.
 
     Args:
         row: also with an `altitude` perhaps.
         origin: of the ENU frame.
         altitude: [m] above the origin, where the row has none.
+        above_ground: whether altitudes are above the ground: z is as given, as up at a place is
+            not up at the origin.
 
     Raises:
         ScenarioError: it is too far from the origin.
@@ -35,7 +38,7 @@ def from_degrees(row: YamlRow, origin: Origin, altitude: float | None = None) ->
     if not math.hypot(*point) <= _FARTHEST:
         raise row.refuse('latitude', f'a place within {_FARTHEST / 1e3:g} km of the origin, '
                                      f'{origin.latitude:g}, {origin.longitude:g}')
-    return point
+    return (point[0], point[1], above) if above_ground else point
 
 
 def work_position(row: YamlRow, origin: Origin) -> Point:
@@ -109,7 +112,7 @@ def _points(row: YamlRow, key: str, given: tuple[Any, ...], origin: Origin,
         if height is None and altitude is None:
             raise row.refuse('altitude', f'the height of the points of {key} [m]')
         if isinstance(each, YamlRow):
-            points.append(from_degrees(each, origin, altitude))
+            points.append(from_degrees(each, origin, altitude, row['vertical'] == 'terrain'))
         else:
             x, y, z = (*each, altitude)[:3]
             points.append((x, y, z))
