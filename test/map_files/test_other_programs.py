@@ -133,6 +133,10 @@ READ = {
                                   ['POINT 42']),
     'Mission Planner, terrain': ('a.waypoints', HEAD + ITEM.format(1, 10, 16, 0, 40),
                                  ['POINT 40 terrain']),
+    'QGroundControl for PX4, no home': ('a.waypoints', HEAD.split('0\t1')[0] + ITEM.format(
+        0, 3, 22, 0, 20) + ITEM.format(1, 3, 16, 0, 70), ['POINT 70']),
+    'no home, a task first': ('a.waypoints', HEAD.split('0\t1')[0] + ITEM.format(
+        0, 3, 16, 0, 60) + ITEM.format(1, 3, 16, 0, 70), ['POINT 60', 'POINT 70']),
     'MAVProxy wp save': ('way.txt', (HEAD + ITEM.format(1, 3, 82, 0, 60)).replace('\n', '\r\n'),
                          ['POINT 60']),
     'Litchi, above take-off': ('a.csv', LITCHI.format(0, 0), ['POINT 35', 'POINT 45']),

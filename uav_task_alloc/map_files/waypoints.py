@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from uav_task_alloc.errors import shown
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.map_files.elements import Element, MapFile, MapFileError, check_place
+from uav_task_alloc.map_files.elements import AMSL, Element, MapFile, MapFileError, check_place
 from uav_task_alloc.map_files.qgc_plan import ITEM_FRAMES, TASK_COMMANDS, why_no_task
 
 _HEAD = 'QGC WPL'
 _VERSIONS = '110', '120'
+_WAYPOINT = 16  # MAV_CMD_NAV_WAYPOINT
 _COLUMNS = 12  # index, current, frame, command, 4 parameters, latitude, longitude, altitude, auto
 _TERRAIN = 10, 11  # MAV_FRAME_GLOBAL_TERRAIN_ALT and its _INT form
 
@@ -24,7 +25,8 @@ def read_waypoints(text: str, file: str) -> MapFile:
         file: its name, for messages.
 
     Returns:
-        A point for each waypoint; `origin` is its first item, home.
+        A point for each waypoint; `origin` is its first item where that is home: a waypoint above
+        mean sea level. Files of QGroundControl for PX4 begin without it.
 
     Raises:
         MapFileError: it is no such file, or a value is no number or out of range.
@@ -50,11 +52,12 @@ def _read_item(words: list[str], where: str, first: bool, read: MapFile) -> None
         raise MapFileError(f'{where}: {shown(" ".join(words))}: expected {_COLUMNS} numbers, as '
                            'index, current, frame, command, 4 parameters, latitude, longitude, '
                            'altitude, autocontinue') from None
-    if not first and command not in TASK_COMMANDS:
+    home = first and command == _WAYPOINT and ITEM_FRAMES.get(frame) == AMSL
+    if not home and command not in TASK_COMMANDS:
         read.left_out.append(f'{where}: {why_no_task(command)}')
         return
     place = check_place(where, (words[9], words[8], words[10]))
-    if first:
+    if home:
         read.origin = Origin(place.latitude, place.longitude, place.altitude or 0.0)
         return
     terrain = frame in _TERRAIN
