@@ -5,8 +5,11 @@ from authority_bench import BOTH, MODES, PX4, flying
 from findings_bench import distance, drop_messages, flown_once_each
 from flight_bench import places
 from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.mission.flown_path import FlownPath
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
+from uav_task_alloc.mavlink.transport.codec import Codec
 
 AT_A = (0.0, 100.0, 50.0)
 
@@ -83,3 +86,27 @@ def test_tasks_passed_at_once_survive_a_kill_before_they_are_judged(kind, place)
     bench.run(limit=8.0)
     bench.hand_over()
     flown_once_each(bench, 'ABC')
+
+
+@PX4
+@pytest.mark.parametrize(('state', 'completed'), [
+    (d.MISSION_STATE_COMPLETE, ['A', 'B']), (d.MISSION_STATE_ACTIVE, ['A'])])
+def test_an_end_reported_just_before_a_reboot_counts_where_it_comes_after_it(
+        kind, state, completed):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    for lost in ('MISSION_ITEM_REACHED', 'MISSION_CURRENT'):
+        drop_messages(bench, 'down', lost, lambda m: True)
+    assert bench.run(lambda: places(bench) == ['A', 'B'])
+    bench.run(limit=0.8)
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=2.0)
+    late = d.MAVLink_mission_current_message(1, 2, state, 2)
+    bench.line.tampers.clear()
+    bench.ground_station.receive(1, Codec(1, 1).parse(Codec(1, 1).pack(late))[0], bench.now)
+    bench.run(limit=2.0)
+    assert bench.completed() == completed
+
+
+def test_a_vehicle_without_a_position_has_the_usual_speed():
+    assert FlownPath().fastest == 15.0

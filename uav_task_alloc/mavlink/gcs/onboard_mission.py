@@ -205,8 +205,10 @@ class OnboardMission:
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of the mission protocol; returns the messages to send."""
-        if message.get_type() in ('MISSION_ACK', 'MISSION_COUNT'):
+        if (kind := message.get_type()) in ('MISSION_ACK', 'MISSION_COUNT'):
             self._mission.note_mission_id(message)
+        elif kind == 'MISSION_CURRENT' and self._profile.atomic:
+            self.progress.end_before_restart.note_current(message, now)
         out = self.upload.receive(message, now)
         if not self.upload.may_be_stored:
             if self.upload.busy and self._unconfirmed is None:
@@ -271,8 +273,7 @@ class OnboardMission:
             seq: index without home.
             now: steady time [s].
         """
-        before, self._flown_unset = self._flown_unset, seq
-        items = self.progress.items
+        before, self._flown_unset, items = self._flown_unset, seq, self.progress.items
         if before is None or not before < seq <= len(items):
             return
         if self.progress.was_at_by(items[before], now):
@@ -315,10 +316,9 @@ class OnboardMission:
 
     def complete_flown(self, now: float) -> None:
         """Complete the tasks that the vehicle has flown while the bridge was down."""
-        flown_items = self.resume.flown_items(now)
-        if flown_items and self.tasks and (
-                self.tasks, len(flown_items)) != self._completed_for:
-            self._completed_for = self.tasks, len(flown_items)
+        flown = len(self.resume.flown_items(now))
+        if flown and self.tasks and (self.tasks, flown) != self._completed_for:
+            self._completed_for = self.tasks, flown
             self.progress.complete_offline(self.resume.flown_tasks(self.open_tasks(), now))
 
     def _settle(self, now: float) -> None:

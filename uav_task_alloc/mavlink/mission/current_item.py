@@ -50,12 +50,14 @@ class CurrentItem:
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
         # vehicle times [s] between which it left mission mode while no position came
         self._left_unseen = math.inf, -math.inf
+        # item and when [s] a report of another mode set it back, as that of a restart does
+        self.set_back_from: tuple[int, float] | None = None
         self._after_skipped: int | None = None  # the item after those that were skipped
 
     def begin(self, start: int | None, now: float) -> None:
         """Begin an epoch at an item that the vehicle will report; None: it is not known."""
         self.reports.begin(start, now)
-        self.set_by_other = None
+        self.set_by_other = self.set_back_from = None
 
     def invalidate(self) -> None:
         """End the epoch, and complete what the positions have shown so far."""
@@ -162,6 +164,8 @@ class CurrentItem:
             if seq < len(epoch.items) and not (epoch.finished and seq == len(epoch.items) - 1):
                 if epoch.current is not None and epoch.current < seq:
                     self.claim(epoch.current, seq, now, frame, in_flight=False)
+                if epoch.current is not None and epoch.current > seq:
+                    self.set_back_from = epoch.current, now
                 epoch.current = seq  # set by another station; nothing is flown
         elif epoch.current is not None and epoch.current < seq <= len(epoch.items):
             self._after_skipped = None

@@ -183,7 +183,7 @@ class FlownPath:
         if speeds and (top := max(speeds)) >= _USUAL_SPEED:
             return top
         moving = sum(speed > _HOLD_SPEED for speed in speeds)
-        return max(5.0 if moving >= _FEW else _USUAL_SPEED, *speeds)
+        return max((5.0 if moving >= _FEW else _USUAL_SPEED, *speeds))
 
     def _since(self, since: float, until: float = math.inf) -> list[PositionSample]:
         at = bisect_left(self._samples, since, key=lambda one: one.t)

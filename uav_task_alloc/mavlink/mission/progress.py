@@ -13,6 +13,7 @@ from itertools import chain
 
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks, ProgressEvent
 from uav_task_alloc.mavlink.mission.current_item import CurrentItem
+from uav_task_alloc.mavlink.mission.end_before_restart import EndBeforeRestart
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
@@ -68,6 +69,8 @@ class ProgressTable:
             self._epoch, self._tasks, self.positions, self._epochs, self._frames)
         self._reached = ReachedItems(
             self._epoch, self._tasks, self.positions, self._epochs, self._moves, repeats)
+        self.end_before_restart = EndBeforeRestart(
+            self._epoch, self._tasks, self.positions, self._moves)
         self.path = self.positions.path
 
     @property
@@ -220,6 +223,7 @@ class ProgressTable:
 
     def invalidate(self) -> None:
         """End the epoch: the mission on board is unknown."""
+        self.end_before_restart.note_restart(self._stepped_at)
         self._moves.invalidate()
         self._reached.last = None
         self._epochs.clear()

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The end of a mission that PX4 has reported before a restart, in a frame that comes late."""
+from __future__ import annotations
+
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
+from uav_task_alloc.mavlink.mission.current_item import CurrentItem
+from uav_task_alloc.mavlink.mission.epoch import Epoch
+from uav_task_alloc.mavlink.mission.flown_path import CLOSE
+from uav_task_alloc.mavlink.mission.item import Item
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
+from uav_task_alloc.mavlink.transport.codec import Message
+
+
+class EndBeforeRestart:
+    """Keeps the last item where the vehicle was at it when it was restarted.
+
+    Args:
+        epoch: the mission on board.
+        tasks: of the vehicle.
+        positions: of the vehicle.
+        moves: the current item of `epoch`.
+    """
+
+    def __init__(self, epoch: Epoch, tasks: CompletedTasks, positions: PositionHistory,
+                 moves: CurrentItem) -> None:
+        self._epoch, self._tasks, self._positions, self._moves = epoch, tasks, positions, moves
+        self._ending: tuple[int, Item, float] | None = None  # index, item, until when [s]
+
+    def note_restart(self, now: float) -> None:
+        """Note that the vehicle was restarted; call before the epoch ends.
+
+        Args:
+            now: steady time [s].
+        """
+        epoch, left_at, back = self._epoch, self._moves.left_at, self._moves.set_back_from
+        current = epoch.current if back is None or now - back[1] > MAX_MESSAGE_DELAY else back[0]
+        item = (
+            None if current is None or current >= len(epoch.items) else epoch.items[current])
+        left = self._moves.in_mission or (math.isfinite(left_at) and (
+            self._positions.path.newest - left_at < MAX_MESSAGE_DELAY))
+        at_end = item is not None and left and current == epoch.last_flown and (
+            self._positions.distance(item) <= item.radius + CLOSE)
+        self._ending = None if item is None or current is None or not at_end else (
+            current, item, now + MAX_MESSAGE_DELAY)
+
+    def note_current(self, message: Message, now: float) -> None:
+        """Take a MISSION_CURRENT: a restarted vehicle has not flown its mission to the end yet.
+
+        Args:
+            message: as PX4 sends it.
+            now: steady time [s].
+        """
+        if self._ending is None or message.mission_state != dialect.MISSION_STATE_COMPLETE:
+            return
+        seq, item, deadline = self._ending
+        if message.seq == seq and now < deadline:
+            self._tasks.credit(item)
+        self._ending = None
