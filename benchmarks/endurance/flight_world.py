@@ -83,6 +83,7 @@ class World:
         self.arrivals: list[float] = []  # when heartbeats of the last tick were sent [s]
         self.sent: list[tuple[float, Message]] = []  # by the bridge, in the last tick
         self.notes: list[str] = []
+        self.errors: list[str] = []  # in the bridge, which it has caught
         self.started_at = 0.0  # [s] the bridge
         self.tasks: TaskList | None = None
         self.start()
@@ -150,6 +151,11 @@ class World:
                 self.events.append(session.executor.events.popleft())
             while session.executor.notes:
                 self.notes.append(f'{self.now:.1f} {session.executor.notes.popleft().text}')
+
+        refused = self.ground_station.refusals.notes
+        while refused:
+            if 'Error: ' in (text := refused.popleft().text):
+                self.errors.append(f'{self.now:.1f} errors: {text}')
 
     def _send_down(self, messages: list[Message]) -> None:
         for m in messages:

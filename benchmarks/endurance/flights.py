@@ -10,7 +10,8 @@ controls the aircraft, `completed` those of them that it reported. `flown_twice`
 flown again though a frame was delivered that shows that they were flown (see `flight_evidence`);
 `flown_again_unknowable` those of which no such frame was delivered. --ways 0.5 gives half of the
 tasks a way: reported without having been flown from end to end it is `false_completed`;
-`way_points_again` counts points of ways that were flown again, as after a doubt.
+`way_points_again` counts points of ways that were flown again, as after a doubt. `errors` are
+those that the bridge has caught, with which it has dropped a message or a list.
 --without-authority disables the table, to show that the check can fail. --json: the last line is
 one object. The status is 1 where a flight has a fault.
 """
@@ -279,12 +280,12 @@ class Flight:
 
     def result(self) -> tuple[Counter[str], list[str]]:
         counts = self.counts + self.judge.counts + self.way_judge.counts
-        counts['flights'] = 1
+        counts['flights'], counts['errors'] = 1, len(self.world.errors)
         counts[self.kind] = 1
         if self.gives_back:
             counts['flyable'] = len(set(self.listed) | self.judge.completed)
             counts['completed'] = len(self.judge.completed)
-        faults = self.judge.faults + self.way_judge.faults
+        faults = self.judge.faults + self.way_judge.faults + self.world.errors
         return counts, faults + self.judge.notes
 
 
@@ -335,14 +336,14 @@ def main() -> int:
             print(f'\r{done}/{args.flights} flights ', end='', file=sys.stderr)
     print(file=sys.stderr)
     names = ('flights', 'takeovers', 'failsafes', 'reboots', 'restarts', 'handed_back',
-             'completed', 'flyable', *WRONG, 'flown_again_unknowable')
+             'completed', 'flyable', *WRONG, 'errors', 'flown_again_unknowable')
     result = {name: total[name] for name in (*names, *sorted(set(total) - set(names)))}
     result |= {'seed': args.seed, 'lossy': args.lossy}
     for name, value in result.items():
         print(f'{name:20} {value}', file=sys.stderr if args.json else sys.stdout)
     if args.json:
         print(json.dumps(result))
-    return int(any(total[name] for name in WRONG)
+    return int(any(total[name] for name in (*WRONG, 'errors'))
                or total['completed'] < 0.95 * total['flyable'])
 
 

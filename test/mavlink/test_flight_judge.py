@@ -222,3 +222,9 @@ def test_a_random_flight_that_once_had_a_fault_has_none(seed, number):
     flight = Flight(seed, number, lossy=seed % 2 == 0)
     flight.fly()
     assert flight.result()[1] == []
+
+
+def test_an_error_that_the_bridge_catches_is_reported(monkeypatch):
+    def fail(monkeypatch):
+        monkeypatch.setattr(ProgressTable, 'note_current', lambda *_, **__: 1 / 0)
+    assert fly_random(monkeypatch, 0, fail)['errors'] > 0
