@@ -6,6 +6,7 @@ from allocation import AllocatorDriver
 from uav_task_alloc import plan
 from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.status import health_values, health_warnings
+from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import ThreatZone
 
 HOME = (0.0, 0.0, 0.0)
@@ -243,3 +244,18 @@ def test_finding_19_a_uav_without_a_path_home_gets_only_the_task_under_way():
     driver.event('COMPLETED', 't1', 'a')
     driver.settle()
     assert (driver.route('a'), driver.lists['a'].returns) == ((), False)
+
+
+def test_a_zone_across_a_detour_changes_the_list_though_the_straight_way_is_clear():
+    driver = AllocatorDriver()
+    driver.world.set_zones([ThreatZone.cylinder('a', (500.0, -250.0), 400.0, 0.0, 1000.0)], (),
+                           driver.now)
+    driver.uav('u0', 0.0, 0.0, 50.0)
+    driver.add(('t1', 1000.0, 0.0, 50.0))
+    driver.settle()
+    x, y, _ = driver.lists['u0'].stops[0].leg.via[0]
+    moved = ThreatZone.cylinder('a', (x / 2.0, y / 2.0), 20.0, 0.0, 1000.0)
+    driver.world.set_zones([moved], (), driver.now)
+    driver.settle(1.0)
+    way = (0.0, 0.0, 50.0), *driver.lists['u0'].stops[0].leg.via, (1000.0, 0.0, 50.0)
+    assert path_is_clear(way, [moved])

@@ -18,6 +18,7 @@ from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import Leg, Point, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
+_AT_POINT = 30.0  # [m] from a point that a vehicle is passing
 _MAX_WORK = 20_000_000  # units in one search for a path, some 50 ms
 
 
@@ -104,12 +105,18 @@ class ZonePaths:
         return self.clear(*points)
 
     def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
-        """Return the length [m] still to fly of a leg under way; None if a zone cuts it."""
-        ahead = len(leg.via) - points_passed(position, (*leg.via, goal))
-        for left in (ahead, *range(ahead - 1, -1, -1), *range(ahead + 1, len(leg.via) + 1)):
-            points = (position, *leg.via[len(leg.via) - left:], goal)
-            if self.clear(*points):
-                return polyline_length(points)
+        """Return the length [m] still to fly of a leg under way; None if a zone cuts it.
+
+        At a point of the leg it is not known whether the vehicle has passed it: either will do.
+        """
+        line = (*leg.via, goal)
+        passed = points_passed(position, line)
+        for n in (passed, passed + 1, passed - 1):
+            if n != passed and not (0 <= n < len(line) and math.dist(
+                    position, line[min(n, passed)]) <= _AT_POINT):
+                continue
+            if self.clear(position, *line[n:]):
+                return polyline_length((position, *line[n:]))
         return None
 
     def rest_of_leg(self, position: Point, leg: Leg, goal: Point) -> float | None:
