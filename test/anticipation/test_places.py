@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uav_task_alloc.anticipation.demand import Demand
-from uav_task_alloc.anticipation.places import MOVE_PRICES, Waiting, choose_places
+from uav_task_alloc.anticipation.places import MOVE_PRICES, Waiting, choose_places, move_prices
 
 DEMAND = Demand(np.zeros(2), np.full(2, 10_000.0))
 CELLS = DEMAND.cells
@@ -95,3 +95,7 @@ def test_places_are_chosen_jointly_and_do_not_change_again():
     assert choose(waiting).tolist() == first.tolist()
     apart = [math.dist(a, b) for a, b in zip(first, np.roll(first, 1, 0), strict=True)]
     assert min(apart) > 2000.0
+
+
+def test_a_way_costs_more_in_a_small_fleet():
+    assert [move_prices(uavs).way for uavs in (4, 8, 16)] == pytest.approx([0.25, 0.2, 0.2])

@@ -43,7 +43,24 @@ class MovePrices(NamedTuple):
 
 
 MOVE_PRICES = MovePrices(0.2, 0.2, 250.0, 0.8)
+_SMALL, _SMALL_PRICE = 8, 0.0125  # UAVs; [s/s] more for each that is missing
 ROUNDS = 6  # of best responses, at most
+
+
+def move_prices(uavs: int) -> MovePrices:
+    """Return the prices of moves in a fleet.
+
+    The places of a few UAVs are far from each other: at the price of a larger fleet they would
+    fly a larger share of what they can.
+
+    Args:
+        uavs: of the fleet.
+
+    Returns:
+        MOVE_PRICES from 8 UAVs on; for fewer ones a way costs more.
+    """
+    more = _SMALL_PRICE * max(0, _SMALL - uavs)
+    return MOVE_PRICES._replace(way=MOVE_PRICES.way + more)
 
 
 @kernel

@@ -13,7 +13,7 @@ from uav_task_alloc.anticipation import event_simulation as events
 from uav_task_alloc.anticipation.cover import COVER_PRICES, CoverPrices, make_cover
 from uav_task_alloc.anticipation.demand import Demand, DemandModel
 from uav_task_alloc.anticipation.event_simulation import FleetTimes
-from uav_task_alloc.anticipation.places import MOVE_PRICES, MovePrices, Waiting
+from uav_task_alloc.anticipation.places import MovePrices, Waiting, move_prices
 from uav_task_alloc.anticipation.response_lists import Lists, Tasks
 from uav_task_alloc.anticipation.waiting_q import LearnerSettings, make_learner
 from uav_task_alloc.solver.rng import rng_state
@@ -75,7 +75,7 @@ def summary(stream: TaskStream, response: _Floats, fleet: FleetTimes) -> dict[st
             'busy': float(fleet.busy.sum()) / (len(fleet.busy) * DURATION)}
 
 
-def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrices = MOVE_PRICES,
+def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrices | None = None,
         cover: CoverPrices = COVER_PRICES, model: DemandModel | None = None,
         learner: LearnerSettings | None = None,
         ) -> tuple[_Floats, FleetTimes]:
@@ -86,7 +86,7 @@ def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrice
         uavs: of the fleet.
         policy: a value of POLICIES.
         seed: of where the UAVs are at the begin and of the chained Q.
-        prices: of moves to waiting places.
+        prices: of moves to waiting places; by default those of the fleet.
         cover: prices of cover, of policies that know of demand.
         model: what is learnt; by default as shipped.
         learner: settings of the chained Q; by default those of the study.
@@ -115,7 +115,7 @@ def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrice
                       np.full(uavs, SPEED), np.full(uavs, np.inf), start,
                       np.zeros(uavs, np.int64), np.zeros(uavs))
     rule = events.WaitingPolicy(policy, np.full(2, AREA / 2.0), REVIEW, demand.model.prior,
-                                demand.model.share, prices)
+                                demand.model.share, prices or move_prices(uavs))
     tables = make_learner(uavs, AREA, learner or LearnerSettings())
     events.simulate(tasks, lists, fleet, rule, field, waiting, tables, DURATION, rng_state(seed))
     return tasks.started - tasks.announced, fleet

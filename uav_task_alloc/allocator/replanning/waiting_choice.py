@@ -15,7 +15,7 @@ from uav_task_alloc.allocator.replanning.demand_area import LearntDemand
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.seen_tasks import SeenTasks
 from uav_task_alloc.anticipation.intensity import Cells
-from uav_task_alloc.anticipation.places import MOVE_PRICES, ROUNDS, Waiting, choose_places
+from uav_task_alloc.anticipation.places import ROUNDS, Waiting, choose_places, move_prices
 from uav_task_alloc.model import Point
 from uav_task_alloc.params import AllocatorParams
 
@@ -59,7 +59,7 @@ class WaitingChoice:
         height = float(np.median([each[0] for each in idle.values()]))
         cells = self._outside_zones(demand.cells, paths, height)
         choose_places(cells, self.demand.distance, self.demand.weight(learnt, stamp), waiting,
-                      MOVE_PRICES, ROUNDS, np.zeros((4, cells.x.size)))
+                      move_prices(len(idle) + len(others)), ROUNDS, np.zeros((4, cells.x.size)))
         moved = np.hypot(*(waiting.place - before).T) > _NEAR
         return {uav_id: (float(waiting.place[k, 0]), float(waiting.place[k, 1]), idle[uav_id][0])
                 for k, uav_id in enumerate(ids) if moved[k]}
