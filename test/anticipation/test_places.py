@@ -98,4 +98,5 @@ def test_places_are_chosen_jointly_and_do_not_change_again():
 
 
 def test_a_way_costs_more_in_a_small_fleet():
-    assert [move_prices(uavs).way for uavs in (4, 8, 16)] == pytest.approx([0.25, 0.2, 0.2])
+    assert [move_prices(uavs).way for uavs in (3, 4, 6, 8, 16)] == pytest.approx(
+        [0.2, 0.25, 0.225, 0.2, 0.2])

@@ -43,7 +43,7 @@ class MovePrices(NamedTuple):
 
 
 MOVE_PRICES = MovePrices(0.2, 0.2, 250.0, 0.8)
-_SMALL, _SMALL_PRICE = 8, 0.0125  # UAVs; [s/s] more for each that is missing
+_LEAST, _SMALL, _MORE = 4, 8, 0.0125  # UAVs; [s/s] more for each that is missing
 ROUNDS = 6  # of best responses, at most
 
 
@@ -57,9 +57,9 @@ def move_prices(uavs: int) -> MovePrices:
         uavs: of the fleet.
 
     Returns:
-        MOVE_PRICES from 8 UAVs on; for fewer ones a way costs more.
+        With 4 to 7 UAVs a way costs more than in MOVE_PRICES; fewer were not measured.
     """
-    more = _SMALL_PRICE * max(0, _SMALL - uavs)
+    more = _MORE * (_SMALL - uavs) if _LEAST <= uavs < _SMALL else 0.0
     return MOVE_PRICES._replace(way=MOVE_PRICES.way + more)
 
 
