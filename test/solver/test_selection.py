@@ -10,7 +10,7 @@ from plan_checks import check
 from uav_task_alloc import Task, Uav, plan
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.routes import empty_routes
-from uav_task_alloc.solver.selection import must_leave_tasks, out_of_reach
+from uav_task_alloc.solver.selection import MOST_BOUNDED, must_leave_tasks, out_of_reach
 
 HOME = Rules(returns=True)
 
@@ -69,6 +69,7 @@ def test_no_bound_is_computed_without_time_for_it_or_few_tasks_left():
     assert not is_proven(uavs, tasks, budget=0.001)
     assert not is_proven(uavs, tasks, Rules(returns=True, hard=False))
     assert not is_proven(uavs, [])
+    assert not is_proven(*fleet_and_tasks(MOST_BOUNDED + 1, reach=500.0), budget=1e4)
     problem = make_problem(uavs, tasks, {}, Limits(), HOME)
     routes = empty_routes(problem.arrays)
     routes.uav_of[2:62] = 0

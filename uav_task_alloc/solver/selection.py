@@ -18,6 +18,7 @@ from uav_task_alloc.solver.routes import Floats, Routes
 
 FEW_LEFT = 0.05  # up to this share of tasks left out by the first routes no bound is computed
 MOST_STEPS = 10  # of the multipliers
+MOST_BOUNDED = 1000  # tasks; of more, the lengths between all pairs would take too much memory
 SHARE = 0.02  # of the budget that the bound may take
 ROW_TIME, ENTRY_TIME = 5e-6, 1e-8  # [s] of a step, for each task and each pair of tasks
 STEP, STEP_DECAY = 0.03, 0.95  # of the multipliers, in mean distances between tasks; its factor
@@ -61,6 +62,8 @@ def must_leave_tasks(problem: Problem, routes: Routes, budget: float) -> bool:
     if not math.isfinite(left) or np.mean(routes.uav_of[a.uavs:a.ends] < 0) <= FEW_LEFT:
         return False
     tasks = int(a.ends - a.uavs)
+    if tasks > MOST_BOUNDED:
+        return False
     steps = int(SHARE * budget / (tasks * (ROW_TIME + tasks * ENTRY_TIME)))
     return steps > 0 and _exceeds(problem, left, min(steps, MOST_STEPS))
 
