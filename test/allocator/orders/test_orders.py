@@ -249,6 +249,23 @@ def test_a_pinned_task_waits_for_a_uav_that_failed_at_it(driver):
     assert 't3' in driver.route('a')
 
 
+def test_a_status_before_the_next_plan_names_no_order_that_was_taken_back(driver):
+    assert driver.order('RETURN').success
+    driver.settle()
+    driver.add(('t4', 500, 0))
+    assert driver.order('FORBID', 'b', 't4').success
+    driver.settle()
+    assert driver.reason('t4') == 'not b (order o3 of ann); no UAV available'
+    assert driver.order('RESUME', 'a').success
+    driver.core.tick(driver.now, driver.now)
+    assert driver.reason('t4') == 'not b (order o3 of ann); waits for the next plan'
+    assert driver.order('UNDO', order_id='o3').success
+    driver.core.tick(driver.now, driver.now)
+    assert (driver.state('t4'), driver.reason('t4')) == ('PENDING', 'waits for the next plan')
+    driver.settle()
+    assert 't4' in driver.route('a')
+
+
 def test_orders_outlive_a_restart(driver):
     assert driver.order('PIN', 'b', 't1').success
     assert driver.order('PAUSE', 'a', keep_tasks=True).success

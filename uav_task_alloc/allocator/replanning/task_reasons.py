@@ -2,6 +2,7 @@
 """What a plan makes of each open task: its UAV, or the reason why it has none."""
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from uav_task_alloc.allocator.records import TaskRecord
@@ -10,6 +11,9 @@ from uav_task_alloc.allocator.state.task_state_machine import TaskStep, TaskTran
 from uav_task_alloc.allocator.state.tasks import without_failed
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
+
+_NO_UAV = 'no UAV available'
+_OF_ORDER = re.compile(r'\border o\d+ of ')  # see Order.name
 
 
 def task_steps(world: World, left_out: Mapping[str, str]) -> list[TaskStep]:
@@ -57,7 +61,7 @@ def _unlisted(record: TaskRecord, fleet: Fleet, usable: frozenset[str],
                            if may_fly(task, record.failed_on, uav.report))
     if not usable:
         return TaskStep(task.id, TaskTransition.LEAVE, why=_joined(
-            ordered, blocked or 'no UAV available'))
+            ordered, blocked or _NO_UAV))
     others = without_failed(record, usable).allowed_uavs
     if record.failed_on and others is not None and others.isdisjoint(usable):
         why = f'failed on {", ".join(record.failed_on)}; no other UAV that may fly it is available'
@@ -66,9 +70,18 @@ def _unlisted(record: TaskRecord, fleet: Fleet, usable: frozenset[str],
     elif task.id in left_out:
         why = left_out[task.id]
     else:
-        why = record.reason or 'waits for the next plan'
-        return TaskStep(task.id, TaskTransition.WAIT, why=why)
+        return TaskStep(task.id, TaskTransition.WAIT, why=_waits(record, ordered))
     return TaskStep(task.id, TaskTransition.LEAVE, why=_joined(ordered, why, blocked))
+
+
+def _waits(record: TaskRecord, ordered: str) -> str:
+    """Why a task that no plan has considered waits: its reason, but none of what held before.
+
+    Orders may have been taken back since, and UAVs are available again.
+    """
+    if record.reason and not (_OF_ORDER.search(record.reason) or record.reason.endswith(_NO_UAV)):
+        return record.reason
+    return _joined(ordered, 'waits for the next plan')
 
 
 def owner_state(task_id: str, record: TaskRecord, fleet: Fleet) -> str:
