@@ -144,7 +144,8 @@ class OperatorDesk:
             return OrderAnswer(True, f'no order held {request.uav}', '', 0.0, 0.0)
         same = [order for order in self._world.orders.in_force.values()
                 if order.kind is ORDER_KINDS[request.action] and order.tasks == request.tasks
-                and request.uav in ('', order.uav)]
+                and request.uav in ('', order.uav)
+                and (order.kind is not OrderKind.PAUSE or order.keep_tasks == request.keep_tasks)]
         return OrderAnswer(True, f'in force already: {first_of(each.name for each in same)}',
                            ','.join(each.id for each in same), 0.0, 0.0)
 

@@ -156,6 +156,13 @@ def test_an_order_that_is_repeated_is_one_order(driver):
     assert list(driver.world.orders.in_force) == ['o1']
 
 
+def test_a_pause_that_is_repeated_is_not_the_one_that_keeps_the_tasks(driver):
+    assert driver.order('PAUSE', 'a', keep_tasks=True).order_id == 'o1'
+    assert driver.order('PAUSE', 'a', keep_tasks=False).order_id == 'o2'
+    again = driver.order('PAUSE', 'a', keep_tasks=False)
+    assert (again.success, again.order_id) == (True, 'o2')
+
+
 def test_a_dry_run_tells_the_price_and_changes_nothing(driver):
     driver.plan = plan
     before = (driver.world.version, driver.world.revision, dict(driver.lists))
