@@ -80,6 +80,7 @@ class MissionExecutor:
         self.onboard = OnboardMission(peer, profile, origin, self.telemetry, rng)
         self.sender = CommandSender(peer, profile, self.telemetry)
         self.onboard.list.leg.locate = self._leg_start
+        self.onboard.list.zones = lambda: self.policy.zones
         evidence = MissionEvidence(self.onboard, self.telemetry)
         self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)
@@ -90,8 +91,7 @@ class MissionExecutor:
         self._rates = MessageRates(peer, self.telemetry, now)
         self._end_actions = EndActions(peer, profile, self.onboard)
         self._was_stale, self._restarts = False, 0
-        self._event_retry = EventRetry()
-        self._status_text_log = StatusTextLog()
+        self._event_retry, self._status_text_log = EventRetry(), StatusTextLog()
         self.fence = VehicleFence(peer, profile, origin, self.telemetry, self.onboard,
                                  self.authority, lambda: self.policy, rng,
                                  fence_memory or FenceMemory())
@@ -335,11 +335,11 @@ class MissionExecutor:
             self.sender.fail(now)
         if not onboard.upload.busy:
             return None
-        seq = onboard.next_unflown()
+        seq = onboard.next_item()
         if seq is not None and self.authority.held:
             onboard.progress.begin_set_current(seq)
             return self.sender.set_current(
-                seq + onboard.own, now, lambda t: onboard.progress.note_set_current(seq, t))
+                seq + onboard.own, now, lambda t: onboard.note_set(seq, t))
         self.sender.waits_for = 'its upload'
         if (onboard.upload.state in (UploadState.BACKOFF, UploadState.DRAINING)
                 and onboard.outdated and onboard.held is not None and onboard.wanted()

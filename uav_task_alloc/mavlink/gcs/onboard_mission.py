@@ -11,6 +11,7 @@ from uav_task_alloc.mavlink.gcs.resume import Resume
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_failures import UploadFailures
 from uav_task_alloc.mavlink.mission.diff import DiffKind, LatestDiff, MissionDiff, diff_missions
+from uav_task_alloc.mavlink.mission.flown_meanwhile import first_task, next_unflown, resumed_at
 from uav_task_alloc.mavlink.mission.items import Item, TaskList, all_alike, home_item
 from uav_task_alloc.mavlink.mission.outcomes import Accepted, Downloaded, Failed, Mission, Verified
 from uav_task_alloc.mavlink.mission.peer import Peer
@@ -173,31 +174,24 @@ class OnboardMission:
         self.upload_started_at, self._sent_since, self._sent_frame = now, None, None
         self.list.horizon.begin()
         self._done_at_start = self._done()
-        home = () if not self.own else (home_item(
-            self._telemetry.home, self._origin, self._profile.rules),)
+        home = (home_item(self._telemetry.home, self._origin, self._profile.rules),) * self.own
         return self.upload.replace(Mission(
             home + diff.items, diff.start + self.own, self._profile.atomic, self.own), now)
 
     def _done(self) -> frozenset[str]:
         return self.progress.pending.union(self.progress.completed)
 
-    def _starts_at_flown(self) -> bool:
-        """Whether an atomic replacement starts at a task that was flown in the meantime."""
-        if self._uploading is None or self._taken or not self._profile.atomic:
-            return False
-        diff = self._uploading[0]
-        first = next((item for item in diff.items[diff.start:] if item.completes), None)
-        return first is not None and first.task in self.progress.completed
-
-    def next_unflown(self) -> int | None:
-        """Seq to continue at where it flies to a flown task during a transfer (PX4)."""
-        progress, item = self.progress, self.progress.active
-        if self._uploading is None or not (self._taken or not self._may_be_of_new) or (
-                not self._profile.atomic or item is None or item.task not in progress.completed):
+    def next_item(self) -> int | None:
+        """Seq to set during a transfer: past what PX4 has flown meanwhile; None: it flies on."""
+        if self._uploading is None or not self._profile.atomic or (
+                self._may_be_of_new and not self._taken):
             return None
-        return next((n for n, other in enumerate(progress.items[:progress.last_flown + 1])
-                     if n > (progress.current or 0) and other.task not in progress.completed),
-                    None)
+        return next_unflown(self.progress) if self.set_current_to is None else self.set_current_to
+
+    def note_set(self, seq: int, now: float) -> None:
+        """Note that the current item was set during a transfer."""
+        self.set_current_to = None
+        self.progress.note_set_current(seq, now)
 
     def _overtaken(self) -> bool:
         """Whether, before another attempt, the upload is partly flown or of an older list."""
@@ -222,7 +216,9 @@ class OnboardMission:
         """Advance time; returns the messages to send."""
         out = self.upload.step(now)
         self._reports.step(self.unknown_upload, now)
-        if self._starts_at_flown() and not self.upload.sent_all:
+        if self._uploading is not None and not self._taken and self._profile.atomic and (
+                first_task(self._uploading[0]) in self.progress.completed) and (
+                not self.upload.sent_all):  # it would start at a task flown meanwhile
             out += self.upload.cancel(now)
         self._settle(now)
         return out
@@ -274,7 +270,7 @@ class OnboardMission:
             now: steady time [s].
         """
         before, self._flown_unset, items = self._flown_unset, seq, self.progress.items
-        if before is None or not before < seq <= len(items):
+        if before is None or self._profile.atomic or not before < seq <= len(items):
             return
         if self.progress.was_at_by(items[before], now):
             self.progress.credit(items[before])
@@ -346,16 +342,20 @@ class OnboardMission:
         of_new = self._reports.begin_new(diff)
         self.item_time = (self.item_time + (now - self.upload_started_at) / len(diff.items)) / 2.0
         self.resume.keep_flown()
-        self._flown_unset = None
+        self._flown_unset, later = None, resumed_at(
+            self.progress.items, self.progress.current, diff)
         if diff.kind is DiffKind.APPEND:
             self.progress.extend(diff.items)
         else:
             self.progress.begin(diff.items, diff.start, now, since=self._sent_since)
         self._reports.replay(of_new, self._mission.reported_id, self._sent_frame)
+        current = self.progress.current
         if diff.kind is not DiffKind.APPEND and not self._profile.atomic:
-            current = self.progress.current
             self.set_current_to = current if current is not None and (
                 current < len(diff.items)) else diff.start
+        elif later > diff.start == current:  # PX4 has flown on during the upload
+            self.progress.note_set_current(later, now)
+            self.set_current_to = later
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
         self._mission.verify(items, now)

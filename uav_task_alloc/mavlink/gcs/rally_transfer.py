@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from uav_task_alloc.geometry.zones_on_path import zone_across_path
 from uav_task_alloc.mavlink.fence.onboard_fence import FenceState, OnboardFence
 from uav_task_alloc.mavlink.fence.rally import RallyPoint, choose_rally, rally_items
-from uav_task_alloc.mavlink.gcs.return_path import zone_across_path
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.model import Point, ThreatZone

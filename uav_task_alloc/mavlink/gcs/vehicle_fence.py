@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.geometry.zones_on_path import zones_across_path
 from uav_task_alloc.mavlink.autopilots import Profile
 from uav_task_alloc.mavlink.fence.choice import Fence, FlightSpace, choose_fence
 from uav_task_alloc.mavlink.fence.fence_parameters import FenceParameters
@@ -29,7 +30,6 @@ from uav_task_alloc.mavlink.gcs.authority import Authority, SendAction
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.rally_transfer import RALLY_BUDGET, RallyTransfer
-from uav_task_alloc.mavlink.gcs.return_path import zones_across_path
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.peer import Peer

@@ -54,6 +54,7 @@ class PieceCoverage:
         self.left: deque[str] = deque(maxlen=_KEPT)  # ways that were left, to be taken
         self._partly: dict[str, None] = {}  # those of which a part is flown
         self._under_way: str | None = None
+        self._latest: str | None = None  # under way, or left without flying to another task
         self._ending: str | None = None  # passed in flight; it is not known how far it was flown
         self._sampled = -math.inf  # vehicle time [s] of the newest position
         self._restored: set[str] = set()  # under way when the previous run of the bridge ended
@@ -104,6 +105,23 @@ class PieceCoverage:
             return stop
         return replace(stop, rest=tuple(piece.way), begun=True)
 
+    def begin_of_rest(self, stop: MissionStop) -> float:
+        """Where on the way of a stop its rest begins [m], in the direction of flight."""
+        piece = self._pieces.get(stop.task.id)
+        if piece is None or not stop.task.path:
+            return 0.0
+        return piece.at[-1] - piece.high if piece.reversed else piece.low
+
+    @property
+    def latest(self) -> str | None:
+        """The task whose way the vehicle is on, or has left without flying to another one."""
+        return self._latest
+
+    @property
+    def corridor(self) -> float:
+        """Distance from a way at which the vehicle still follows it [m]."""
+        return self._corridor
+
     def is_under_way(self, task: str) -> bool:
         """Whether the vehicle is flying along the way of a task."""
         return task == self._under_way
@@ -120,6 +138,8 @@ class PieceCoverage:
         task = item.task if item is not None and in_mission and item.along else None
         if not in_mission:
             self._recent.clear()
+        elif task is not None or (item is not None and item.task != self._latest):
+            self._latest = task
         piece = None if task is None else self._pieces.get(task)
         if task == self._under_way and not (piece is not None and piece.gone):
             return
@@ -267,7 +287,7 @@ class PieceCoverage:
     def leave(self) -> None:
         """Note that the vehicle was restarted, or its mission is not known."""
         self.note_active(None, False)
-        self._sampled = -math.inf
+        self._sampled, self._latest = -math.inf, None
 
     def marks(self, completed: Container[str]) -> tuple[PieceMark, ...]:
         """What a restarted bridge has to know of the pieces that are partly flown."""

@@ -16,6 +16,7 @@ from uav_task_alloc.mavlink.mission.horizon import Horizon
 from uav_task_alloc.mavlink.mission.items import (
     MOST_ITEMS,
     Item,
+    MissionStop,
     TaskList,
     all_alike,
     lands_by_item,
@@ -26,8 +27,9 @@ from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.mavlink.mission.waits import Waits
+from uav_task_alloc.mavlink.mission.way_approach import approach
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
-from uav_task_alloc.model import Point, Task
+from uav_task_alloc.model import Point, Task, ThreatZone
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +73,7 @@ class WantedMission:
         # own speed of the vehicle [m/s], whether it is wanted; 0: being read, NaN: not known
         self.read_speed: Callable[[bool], float] = lambda wanted: math.nan
         self.stored_pieces: tuple[PieceMark, ...] = ()  # of the previous run of the bridge
+        self.zones: Callable[[], tuple[ThreatZone, ...]] = tuple  # in force
         self._changes_speed = False  # an action of the list does
         self._airborne, self._home = airborne, home
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
@@ -152,21 +155,44 @@ class WantedMission:
         assert self.tasks is not None
         ended = tuple(self._progress.completed), self._progress.pending, tuple(self._refused)
         coverage = self._progress.coverage
-        key = self.tasks, ended, self.horizon.stops, coverage.version
+        key = self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest
         if self._remaining is None or self._remaining[0] != key:
             tasks = self.tasks.without(chain.from_iterable(ended))
-            tasks = replace(tasks, stops=tuple(map(coverage.rest, tasks.stops)))
-            key = self.tasks, ended, self.horizon.stops, coverage.version
+            tasks = replace(tasks, stops=self._rests(tasks.stops))
+            key = self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest
             self._remaining = key, (
                 tasks if self.horizon.stops is None else tasks.first(self.horizon.stops))
         return self._remaining[1]
 
+    def _rests(self, stops: tuple[MissionStop, ...]) -> tuple[MissionStop, ...]:
+        """Stops with what is left of their ways, and with the points on which it is reached."""
+        rests = [self._progress.coverage.rest(stop) for stop in stops]
+        return tuple(
+            self._reached(stop, rests[n - 1].end if n else None)
+            if stop.task.path and (stop.begun or n == 0) else stop
+            for n, stop in enumerate(rests))
+
+    def _reached(self, stop: MissionStop, before: Point | None) -> MissionStop:
+        """A stop with a way, reached from the end of the one before; None: from the vehicle."""
+        coverage, place = self._progress.coverage, before
+        on_way = before is None and coverage.latest == stop.task.id
+        if coverage.is_under_way(stop.task.id):
+            return replace(stop, via=())
+        if before is None:
+            start = self.leg.locate()
+            place = None if start is None else start.point
+        way = stop.task.path[::-1] if stop.reversed else stop.task.path
+        via = approach(stop.via, place, way, coverage.begin_of_rest(stop), self.zones(),
+                       coverage.corridor, on_way)
+        return stop if via == stop.via else replace(stop, via=via)
+
     def items(self) -> tuple[Item, ...]:
         """The items to fly from here; a task that cannot be an item is refused."""
         self.waits.note_active(self.remaining(), self._progress.active)
+        coverage = self._progress.coverage
         state = (self.tasks, self.waits.version, len(self._progress.completed),
                  self._progress.pending, len(self._refused), self.horizon.stops,
-                 self._progress.coverage.version, self.cruise())
+                 coverage.version, coverage.latest, self.cruise())
         if self._leg_key != state or self.leg.is_off:
             self.leg.begin(self.remaining())
             self._leg_key = state
@@ -235,8 +261,8 @@ class WantedMission:
         if stops < max(1, (self.horizon.stops or 0) // 2):
             return False  # the items of a list of thousands take a second
         open_tasks = self.tasks.without({*self._progress.completed, *self._refused})
-        everything = replace(open_tasks, returns=False, end_via=(), stops=tuple(
-            map(self._progress.coverage.rest, open_tasks.stops)))
+        everything = replace(open_tasks, returns=False, end_via=(),
+                             stops=self._rests(open_tasks.stops))
         wanted = self._items_of(everything)
         first = next((n for n, item in enumerate(wanted) if item.completes), 0)
         return any(all_alike(wanted[n:n + len(rest)], rest) for n in range(first + 1))

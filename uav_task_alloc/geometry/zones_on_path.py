@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which zone the straight return path enters in plan view: RTL flies it at its own height."""
+"""Which zones a straight path enters in plan view, at whichever height it is flown.
+
+Imports no numba, so that nodes start fast.
+"""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
@@ -22,17 +25,27 @@ def zone_across_path(a: Point, b: Point, zones: Iterable[ThreatZone]) -> ThreatZ
     return next(zones_across_path(a, b, zones), None)
 
 
-def zones_across_path(a: Point, b: Point, zones: Iterable[ThreatZone]) -> Iterator[ThreatZone]:
-    """Find all zones that the vertical plane through a path enters; see `zone_across_path`."""
+def zones_across_path(a: Point, b: Point, zones: Iterable[ThreatZone],
+                      clearance: float = 0.0) -> Iterator[ThreatZone]:
+    """Find all zones that the vertical plane through a path enters.
+
+    Args:
+        a, b: see `zone_across_path`.
+        zones: each with its margin [m].
+        clearance: [m] beyond the margins that is to be kept as well.
+
+    Returns:
+        The zones in their order; none where an end is not known (NaN).
+    """
     start, end = (a[0], a[1]), (b[0], b[1])
-    return (zone for zone in zones if _enters(start, end, zone))
+    return (zone for zone in zones if _enters(start, end, zone, zone.margin + clearance))
 
 
-def _enters(a: XY, b: XY, zone: ThreatZone) -> bool:
+def _enters(a: XY, b: XY, zone: ThreatZone, grow: float) -> bool:
     if zone.shape is not Shape.POLYGON:
         center = zone.center[0], zone.center[1]
-        return segment_distance(center, a, b) <= zone.radius + zone.margin
+        return segment_distance(center, a, b) <= zone.radius + grow
     return contains_point(zone.vertices, a) or any(
-        segments_cross(a, b, c, e) or zone.margin >= min(
+        segments_cross(a, b, c, e) or grow >= min(
             segment_distance(c, a, b), segment_distance(a, c, e), segment_distance(b, c, e))
         for c, e in edges(zone.vertices))
