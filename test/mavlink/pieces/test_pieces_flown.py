@@ -332,3 +332,20 @@ def test_a_way_left_in_silence_for_another_list_is_flown_later():
     bench.line.cut = False
     assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
     assert min(track.times_flown(line)) == 1
+
+
+@pytest.mark.parametrize('turned_at', [2.0, 30.0])  # [s] before its way is begun, and on it
+@pytest.mark.parametrize('closed', [False, True])
+def test_a_way_that_a_list_turns_during_a_long_upload_counts_as_it_is_flown(turned_at, closed):
+    corners = (0, 100), (100, 160), (200, 160), (300, 60)
+    line = piece('L', *corners, *corners[:closed])
+    bench, _ = surveying('px4', list_of(line, strip(0)))
+    assert bench.run(lambda: bench.executor().telemetry.in_mission, 60.0)
+    bench.run(limit=turned_at)
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        direction == 'up' and m.get_type() == 'MISSION_ITEM_INT'
+        and len(bench.flown()) < 4 + closed) else None)
+    bench.assign(list_of(line, strip(0), revision=2, turned=('L',)))
+    assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
+    bench.run(limit=10.0)
+    assert [bench.flown().count(point) for point in line.path[1:-1]] == [1] * (2 + closed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 
@@ -11,6 +12,7 @@ from uav_task_alloc.geometry.polyline import point_at
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.model import Point
 
+_SAME = 1.0  # [m] between the ends of a closed way
 _SHORTEST = 1.0  # [m] of a flown part or of a rest
 _COURSE_SPEED = 1.0  # [m/s] above which a vehicle has a course
 
@@ -74,6 +76,19 @@ class Piece:
         x, y, z = (p - v / speed * away for p, v in zip(
             sample.position, sample.velocity, strict=True))
         return math.dist(start, (x, y, z))
+
+    def is_turned(self, places: Sequence[Point]) -> bool:
+        """Whether a mission flies it in the other direction.
+
+        Args:
+            places: of its items after the first point of the way [m] ENU; (): not known.
+        """
+        if not places:
+            return False
+        first, *_, last = self.way
+        if math.dist(first, last) > _SAME:
+            return math.dist(places[-1], first) < math.dist(places[-1], last)
+        return math.dist(places[0], self.way[-2]) < math.dist(places[0], self.way[1])
 
     def commit(self) -> bool:
         """Leave out the flown part from now on; whether there is one."""

@@ -76,22 +76,27 @@ class PieceCoverage:
                 piece = Piece(stop.task.path, place, at, 0.0, at[-1], stop.reversed)
                 piece.measure()
                 self.version += 1
-            elif piece.path != stop.task.path or piece.reversed != stop.reversed:
-                self._turn(piece, stop)
+            else:
+                turned = piece.path != stop.task.path
+                # one that is being flown is flown on as the mission on board has it
+                flown = name in (self._under_way, self._ending)
+                wanted = piece.reversed is not turned if flown else stop.reversed
+                if turned or piece.reversed is not wanted:
+                    self._turn(piece, stop.task.path, wanted)
             self._pieces[name] = piece
             listed.add(name)
         for name in [name for name in self._pieces if name not in listed][:-_KEPT]:
             del self._pieces[name]
             self._partly.pop(name, None)
 
-    def _turn(self, piece: Piece, stop: MissionStop) -> None:
+    def _turn(self, piece: Piece, path: tuple[Point, ...], backwards: bool) -> None:
         """Take another direction of flight, or of the path."""
         piece.commit()
-        if piece.path != stop.task.path:  # the same points from the other end
+        if piece.path != path:  # the same points from the other end
             length = piece.at[-1]
-            piece.path, piece.at = stop.task.path, [length - at for at in reversed(piece.at)]
+            piece.path, piece.at = path, [length - at for at in reversed(piece.at)]
             piece.low, piece.high = length - piece.high, length - piece.low
-        piece.reversed = stop.reversed
+        piece.reversed = backwards
         piece.measure()
         self.version += 1
 
@@ -103,14 +108,15 @@ class PieceCoverage:
         if piece is None or not stop.task.path or (
                 piece.high - piece.low >= piece.at[-1] - 1e-6):
             return stop
-        return replace(stop, rest=tuple(piece.way), begun=True)
+        way = piece.way if piece.reversed is stop.reversed else reversed(piece.way)
+        return replace(stop, rest=tuple(way), begun=True)
 
     def begin_of_rest(self, stop: MissionStop) -> float:
         """Where on the way of a stop its rest begins [m], in the direction of flight."""
         piece = self._pieces.get(stop.task.id)
         if piece is None or not stop.task.path:
             return 0.0
-        return piece.at[-1] - piece.high if piece.reversed else piece.low
+        return piece.at[-1] - piece.high if stop.reversed else piece.low
 
     @property
     def latest(self) -> str | None:
@@ -122,18 +128,22 @@ class PieceCoverage:
         """Distance from a way at which the vehicle still follows it [m]."""
         return self._corridor
 
-    def is_under_way(self, task: str) -> bool:
-        """Whether the vehicle is flying along the way of a task."""
-        return task == self._under_way
+    def is_followed(self, stop: MissionStop) -> bool:
+        """Whether the vehicle is flying along the way of a stop, in the direction of the stop."""
+        piece = self._pieces.get(stop.task.id)
+        return stop.task.id == self._under_way and (
+            piece is None or piece.reversed is stop.reversed)
 
     def note_active(self, item: Item | None, in_mission: bool,
-                    vehicle_now: Callable[[], float] = lambda: -math.inf) -> None:
+                    vehicle_now: Callable[[], float] = lambda: -math.inf,
+                    mission: Sequence[Item] = ()) -> None:
         """Note the item being flown; the way of another one is left where the vehicle was.
 
         Args:
             item: being flown; None: none, or not known.
             in_mission: whether the vehicle is in mission mode.
             vehicle_now: vehicle time [s].
+            mission: all items on board, which show in which direction a way is flown.
         """
         task = item.task if item is not None and in_mission and item.along else None
         if not in_mission:
@@ -151,6 +161,10 @@ class PieceCoverage:
         if not in_mission or task == self._ending:
             self._leave(self._ending)
         if piece is not None:
+            places = [each.position for each in mission
+                      if each.task == task and each.along and each.position is not None]
+            if piece.is_turned(places):  # a later list turned it
+                self._turn(piece, piece.path, not piece.reversed)
             self._begin(piece, vehicle_now)
             self._partly[task or ''] = None
 
@@ -336,7 +350,7 @@ class PieceCoverage:
                     self._follow(piece, sample, before.t, fastest)
                 self._sampled = max(self._sampled, samples[-1].t)
             if piece.reversed != stop.reversed:
-                self._turn(piece, stop)
+                self._turn(piece, stop.task.path, stop.reversed)
             self.version += 1
 
     def _place(self, piece: Piece, position: Point, t: float) -> None:

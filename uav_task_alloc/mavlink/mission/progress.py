@@ -389,7 +389,8 @@ class ProgressTable:
         return self.positions.near_one(item, other, when)
 
     def _note_active(self) -> None:
-        self.coverage.note_active(self.active, self._moves.in_mission, self._vehicle_now)
+        self.coverage.note_active(self.active, self._moves.in_mission, self._vehicle_now,
+                                  self.items)
 
     def _vehicle_now(self) -> float:
         return self.positions.vehicle_time(self._stepped_at)

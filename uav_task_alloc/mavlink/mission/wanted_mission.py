@@ -176,7 +176,7 @@ class WantedMission:
         """A stop with a way, reached from the end of the one before; None: from the vehicle."""
         coverage, place = self._progress.coverage, before
         on_way = before is None and coverage.latest == stop.task.id
-        if coverage.is_under_way(stop.task.id):
+        if coverage.is_followed(stop):
             return replace(stop, via=())
         if before is None:
             start = self.leg.locate()
@@ -215,8 +215,7 @@ class WantedMission:
     def _items_of(self, tasks: TaskList) -> tuple[Item, ...]:
         """The items of a list, with long legs divided where a mission has the capacity."""
         rules, tasks = self._profile.rules, self.waits.with_holds(tasks)
-        on_way = bool(tasks.stops) and self._progress.coverage.is_under_way(
-            tasks.stops[0].task.id)
+        on_way = bool(tasks.stops) and self._progress.coverage.is_followed(tasks.stops[0])
         ahead = () if on_way else self.leg.points_ahead(first_point(tasks))
         filled = mission_items(with_points_between(tasks, ahead), rules, self._origin,
                                self._home(), self.cruise())
