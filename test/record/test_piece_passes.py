@@ -60,8 +60,9 @@ def test_a_strip_flown_twice_is_found():
     assert run_summary(run(), truth)['flown_twice'] == ['field#1']
 
 
-def test_a_strip_that_a_lost_vehicle_began_is_not_flown_twice():
+@pytest.mark.parametrize(('last', 'twice'), [(180.0, 0), (191.0, 0), (199.0, 1)])
+def test_a_strip_that_a_lost_vehicle_began_is_not_flown_twice(last, twice):
     truth = flown(*BOTH)
     truth.tracks['lost'] = [TrueSample(20.0 * k, (x, 40.0, 50.0))
-                            for k, x in enumerate((-20.0, 180.0))]
-    assert run_summary(run(), truth)['tasks_flown_twice'] == 0
+                            for k, x in enumerate((-20.0, last))]
+    assert run_summary(run(), truth)['tasks_flown_twice'] == twice

@@ -72,7 +72,9 @@ def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[float
         if along and _is_whole(along, way):
             yield along[-1].wall
         along.clear()
-    if along and _is_whole(along, way):
+    # a vehicle that was lost on the way has cut no corner after it
+    if along and _is_whole(along, way) and min(
+            math.dist(along[-1].point, end) for end in (way[0], way[-1])) <= _BESIDE:
         yield along[-1].wall
 
 
