@@ -2,7 +2,6 @@
 """What a plan makes of each open task: its UAV, or the reason why it has none."""
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 from uav_task_alloc.allocator.records import TaskRecord
@@ -13,7 +12,6 @@ from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 
 _NO_UAV = 'no UAV available'
-_OF_ORDER = re.compile(r'\border o\d+ of ')  # see Order.name
 
 
 def task_steps(world: World, left_out: Mapping[str, str]) -> list[TaskStep]:
@@ -70,18 +68,9 @@ def _unlisted(record: TaskRecord, fleet: Fleet, usable: frozenset[str],
     elif task.id in left_out:
         why = left_out[task.id]
     else:
-        return TaskStep(task.id, TaskTransition.WAIT, why=_waits(record, ordered))
+        waits = _joined(ordered, 'waits for the next plan')
+        return TaskStep(task.id, TaskTransition.WAIT, why=waits)
     return TaskStep(task.id, TaskTransition.LEAVE, why=_joined(ordered, why, blocked))
-
-
-def _waits(record: TaskRecord, ordered: str) -> str:
-    """Why a task that no plan has considered waits: its reason, but none of what held before.
-
-    Orders may have been taken back since, and UAVs are available again.
-    """
-    if record.reason and not (_OF_ORDER.search(record.reason) or record.reason.endswith(_NO_UAV)):
-        return record.reason
-    return _joined(ordered, 'waits for the next plan')
 
 
 def owner_state(task_id: str, record: TaskRecord, fleet: Fleet) -> str:
