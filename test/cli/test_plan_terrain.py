@@ -62,7 +62,7 @@ def test_legs_and_ways_keep_clear_of_a_ridge():
             assert a[:2] == b[:2]  # upright
     assert len(tasks['path#1'].path) > 3
     _, blocked = over_terrain(replace(loaded, altitude_max=20.0), flat, terrain, 30.0)
-    assert 'altitude_max = 20 m is in the way' in blocked['hut']
+    assert blocked['hut'] == 'uav_1'
     home = plan([uav], list(tasks.values()), budget=0.05, seed=1, route_end='home')
     with pytest.raises(InvalidValue, match='uav_1: leg to its home'):
         over_terrain(replace(loaded, altitude_max=20.0), home, terrain, 30.0)
@@ -95,6 +95,27 @@ def test_a_zone_above_a_ridge_is_flown_around_or_the_task_left_out(shape, reache
     assert path_is_clear(points, [timed.zone for timed in loaded.zones], loaded.clearance)
     assert all(terrain.least_clearance(a, b)[0] >= 29.8 for a, b in pairwise(points)
                if a[:2] != b[:2])
+
+
+def test_a_task_that_one_uav_does_not_reach_is_flown_by_another():
+    given = parse(SCENARIO.replace('uavs:', """zones:
+  - {id: air, shape: polygon, z_min: 150, vertices: [[-100, -2600], [100, -2600], [100, 2600],
+     [-100, 2600]], z_max: 900}
+uavs:
+  - {id: uav_2, position: [900, 2400, 0.5]}"""))
+    terrain = ridge(given.origin)
+    loaded = replace(given, tasks=tuple(
+        timed for timed in given.tasks if timed.task.id == 'hut'))
+    uavs = [timed.uav for timed in loaded.uavs]
+
+    def solve(some):
+        return plan(uavs, [timed.task for timed in some.tasks], [
+            timed.zone for timed in some.zones], budget=0.02, seed=1, clearance=some.clearance)
+
+    flat = solve(loaded)
+    assert flat.routes['uav_1'] == ('hut',)  # it is nearer, but for the ridge
+    higher = plan_over_terrain(loaded, flat, terrain, 30.0, solve)
+    assert (higher.routes, higher.unassigned) == ({'uav_1': (), 'uav_2': ('hut',)}, {})
 
 
 def test_heights_above_ground_are_those_of_the_task():

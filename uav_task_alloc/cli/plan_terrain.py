@@ -11,7 +11,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Leg, Plan, Point
 from uav_task_alloc.model.route_stops import route_stops
-from uav_task_alloc.scenario.values import Scenario
+from uav_task_alloc.scenario.values import Scenario, TimedTask
 from uav_task_alloc.terrain import Terrain, check_above
 from uav_task_alloc.terrain_legs import TerrainLegs
 
@@ -84,8 +84,8 @@ def over_terrain(loaded: Scenario, result: Plan, terrain: Terrain,
         clearance: [m]; tasks that are lower are left and reached upright.
 
     Returns:
-        The plan with points added to its legs, where lengths count them and times do not; and why
-        tasks cannot be reached, by their ids: their legs are as they were.
+        The plan with points added to its legs, where lengths count them and times do not; and the
+        UAVs that do not reach their tasks, by the tasks' ids: those legs are as they were.
 
     Raises:
         InvalidValue: no leg leads home.
@@ -94,8 +94,6 @@ def over_terrain(loaded: Scenario, result: Plan, terrain: Terrain,
     known = {timed.task.id: timed.task for timed in loaded.tasks}
     over = TerrainLegs(terrain, clearance, loaded.altitude_max, _Zones(loaded))
     legs, blocked, more = {}, dict[str, str](), 0.0
-    why = (f'{clearance:g} m above the ground a zone or altitude_max = '
-           f'{loaded.altitude_max:g} m is in the way')
     for uav in loaded.uavs:
         at, found = uav.position, []
         for leg, stop in zip(result.legs.get(uav.id, ()), route_stops(
@@ -103,9 +101,9 @@ def over_terrain(loaded: Scenario, result: Plan, terrain: Terrain,
             via = over.over((at, *stop.via, stop.points[0]))
             if via is None and stop.task is None:
                 raise InvalidValue(f'{uav.id}: leg to its home', stop.points[0],
-                                   f'a way over the terrain: {why}')
+                                   f'a way over the terrain: {_in_the_way(loaded, clearance)}')
             if via is None:
-                blocked[stop.task or ''] = f'no safe path for {uav.id}: {why}'
+                blocked[stop.task or ''] = uav.id
                 via = stop.via
             length = polyline_length((at, *via, stop.points[0]))
             more += max(0.0, length - leg.length)
@@ -119,12 +117,14 @@ def plan_over_terrain(loaded: Scenario, result: Plan, terrain: Terrain, clearanc
                       solve: Callable[[Scenario], Plan]) -> Plan:
     """A plan over the ground, without the tasks that no leg over it leads to.
 
+    A UAV that a plan does not lead to its task is not asked for that task again; the others are.
+
     Args:
         loaded: the scenario.
         result: a plan of it.
         terrain: the ground.
         clearance: [m] that legs keep.
-        solve: plans a scenario again, without such tasks.
+        solve: plans a scenario again, in which fewer UAVs may fly such tasks, or none.
 
     Returns:
         The plan; such tasks are unassigned, with the reason.
@@ -132,12 +132,30 @@ def plan_over_terrain(loaded: Scenario, result: Plan, terrain: Terrain, clearanc
     Raises:
         InvalidValue, TerrainError: as `over_terrain`.
     """
+    unreached = dict[str, list[str]]()
     left_out = dict[str, str]()
+    everybody = frozenset(uav.id for uav in loaded.uavs)
     while True:
         higher, blocked = over_terrain(loaded, result, terrain, clearance)
         if not blocked:
             return replace(higher, unassigned={**higher.unassigned, **left_out})
-        left_out |= blocked
-        loaded = replace(loaded, tasks=tuple(
-            timed for timed in loaded.tasks if timed.task.id not in blocked))
+        rest = list[TimedTask]()
+        for timed in loaded.tasks:
+            task, found = timed.task, unreached.setdefault(timed.task.id, [])
+            if task.id in blocked:
+                found.append(blocked[task.id])
+            allowed = everybody if task.allowed_uavs is None else task.allowed_uavs
+            if not found:
+                rest.append(timed)
+            elif others := allowed.difference(found):
+                rest.append(replace(timed, task=replace(task, allowed_uavs=others)))
+            else:
+                left_out[task.id] = (f'no safe path for {", ".join(found)}: '
+                                     f'{_in_the_way(loaded, clearance)}')
+        loaded = replace(loaded, tasks=tuple(rest))
         result = solve(loaded)
+
+
+def _in_the_way(loaded: Scenario, clearance: float) -> str:
+    return (f'{clearance:g} m above the ground a zone or altitude_max = '
+            f'{loaded.altitude_max:g} m is in the way')

@@ -85,7 +85,7 @@ class WaitingPlaces:
         why = self._why_not_idle(each.uav, record)
         if why or way_to_place_is_clear(self._world, each):
             return why
-        return 'a zone is on its way'
+        return 'its way there is not clear any more'
 
     def _why_not_idle(self, uav_id: str, record: UavRecord) -> str:
         """Why a UAV may not be sent to a place; '': it may."""
