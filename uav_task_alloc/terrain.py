@@ -81,9 +81,12 @@ class Terrain:
             TerrainError: as `above_ground`.
         """
         found = [(x, y, 0.0) for x, y, _ in points]
-        for _ in range(3):  # up at a place is not quite up at the origin
+        for _ in range(4):  # up at a place is not quite up at the origin
+            higher = np.asarray(height) - self.above_ground(found)
             found = [(x, y, float(z + more)) for (x, y, z), more in zip(
-                found, np.asarray(height) - self.above_ground(found), strict=True)]
+                found, higher, strict=True)]
+            if (np.abs(higher) < 0.5).all():
+                break  # 100 km away that moves the place by 8 mm
         return found
 
     def least_clearance(self, a: Point, b: Point) -> tuple[float, float]:
@@ -184,10 +187,11 @@ class Terrain:
             if len(done) + len(open_parts) > _MOST_POINTS:
                 raise TerrainError(f'{self.name}: the leg from {_shown(a)} to {_shown(b)} needs '
                                    f'more than {_MOST_POINTS} points to keep {clearance:g} m')
-            share = min(max(share, 0.02), 0.98)
-            x, y = p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])
-            height, = self.raised([(x, y, 0.0)], clearance + max(_SLACK, 0.02 * clearance))
-            top = x, y, max(height[2], p[2] + share * (q[2] - p[2]) + _SLACK)
+            found = min(max(share, 0.02), 0.98)
+            x, y, z = (p[k] + found * (q[k] - p[k]) for k in range(3))
+            if found != share:
+                least, = self.above_ground([(x, y, z)])
+            top = x, y, z + max(clearance - float(least) + 0.02 * clearance, 0.0) + _SLACK
             open_parts += [(top, q), (p, top)]
         return done[1:-1]
 
