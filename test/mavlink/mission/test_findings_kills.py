@@ -2,16 +2,19 @@
 """What is still to be judged when the bridge is killed, or another mission is read, is known."""
 import pytest
 from authority_bench import BOTH, MODES, PX4, flying
+from evidence_bench import Flight
 from findings_bench import distance, drop_messages, flown_once_each
 from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.mission.flown_path import FlownPath
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.mavlink.transport.codec import Codec
+from uav_task_alloc.model import Task
 
-AT_A = (0.0, 100.0, 50.0)
+AT_A, SPEED = (0.0, 100.0, 50.0), 10.0  # [m/s]
 
 
 @PX4
@@ -110,3 +113,58 @@ def test_an_end_reported_just_before_a_reboot_counts_where_it_comes_after_it(
 
 def test_a_vehicle_without_a_position_has_the_usual_speed():
     assert FlownPath().fastest == 15.0
+
+
+@pytest.mark.parametrize('back', [False, True])
+@pytest.mark.parametrize(('after', 'completed'), [(0.0, ['B']), (0.4, [])])
+def test_a_mode_and_a_current_item_of_a_restart_do_not_hide_the_place_of_before(
+        after, completed, back):
+    flight = Flight()
+    flight.begin(A=50.0, B=100.0, C=500.0)
+    flight.table.note_set_current(1, flight.now)
+    flight.table.note_in_mission()
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    flight.fly_to(100.0)
+    flight.table.note_mission_left(flight.now)
+    if after:  # a pilot has taken it
+        flight.stay(after)
+    if back:
+        flight.table.note_current(0, flight.now, False, flight.frame())
+    flight.table.invalidate()
+    assert list(flight.table.completed) == completed
+
+
+@pytest.mark.parametrize(('seconds', 'completed'), [(0.6, ['A']), (4.0, [])])
+def test_what_stays_current_after_a_place_was_passed_is_not_flown_as_another_station_skips_it(
+        seconds, completed):
+    flight = Flight(repeats=False)
+    flight.begin(A=100.0, B=500.0, C=900.0)
+    flight.table.note_in_mission()
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(98.5)
+    for _ in range(round(5 * seconds)):
+        flight.stay(0.2, SPEED)
+        if flight.now < 9.8 + seconds:
+            flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.table.note_mission_left(flight.now)  # it came late
+    flight.table.note_current(2, flight.now, False, flight.frame())
+    flight.stay(20.0)
+    assert list(flight.table.completed) == completed
+
+
+@PX4
+def test_a_reached_received_while_the_mission_was_read_again_is_no_evidence_after_a_reboot(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: distance(bench, AT_A) < 10.0)
+    drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: True)
+    bench.onboard()._mission.reset()
+    assert bench.run(lambda: bench.completed() == ['A'], 10.0)
+    bench.run(limit=1.0)
+    bench.line.tampers.clear()
+    assert bench.run(lambda: bench.onboard().held is not None, 20.0)
+    bench.assign(TaskList(2, tuple(MissionStop(Task(name, place)) for name, place in (
+        ('X', (3.0, 107.0, 50.0)), ('B', (100.0, 100.0, 50.0))))))
+    assert bench.run(lambda: bench.started()[-1] == 'X', 10.0)
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=12.0)
+    assert bench.completed() == ['A']

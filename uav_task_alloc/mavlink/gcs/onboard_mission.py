@@ -225,7 +225,7 @@ class OnboardMission:
 
     def reached(self, seq: int, now: float, frame: int | None = None) -> None:
         """Process MISSION_ITEM_REACHED; after all items are sent it may be of either mission."""
-        if self.held is None or not self.resume.located:
+        if not self.resume.located:
             self.resume.note_reached(seq, now, self._telemetry.frame)
         if self._may_be_of_new and not (self._appends and seq < len(self.progress.items)):
             self._reports.add_reached(seq, now, self._telemetry.frame)

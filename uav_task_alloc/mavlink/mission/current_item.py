@@ -59,19 +59,33 @@ class CurrentItem:
         self.reports.begin(start, now)
         self.set_by_other = self.set_back_from = None
 
-    def invalidate(self) -> None:
-        """End the epoch, and complete what the positions have shown so far."""
+    def invalidate(self, now: float) -> None:
+        """End the epoch, and complete what the positions have shown so far.
+
+        Args:
+            now: steady time [s].
+        """
         for item in self.passed.seen():
             self._tasks.complete(item.task, item.place)
-        epoch, active = self._epoch, self._epoch.active
-        if active is not None and self.in_mission and self.reports.reported == epoch.current and (
-                self._positions.was_at(
-                    active, max(epoch.since, self._entered_at), close=0.0)):
+        active, since = self._active_at_end(now), max(self._epoch.since, self._entered_at)
+        if active is not None and self._positions.was_at(active, since, close=0.0):
             self._tasks.credit(active)
         self.reports.clear()
         self.passed.clear()
         self.set_by_other = None
         self._left_unseen = math.inf, -math.inf
+
+    def _active_at_end(self, now: float) -> Item | None:
+        """The item that was flown until the last position before a restart; None: not known.
+
+        The mode and the current item of a restarted vehicle may come before its clock shows it.
+        """
+        epoch, back = self._epoch, self.set_back_from
+        if not self.in_mission and self._left_at != self._positions.path.newest:
+            return None
+        if back is not None and now - back[1] < MAX_MESSAGE_DELAY and back[0] < len(epoch.items):
+            return epoch.items[back[0]]
+        return epoch.active if self.reports.reported == epoch.current else None
 
     def note_set(self, seq: int, now: float) -> None:
         """Note that we have set the current item: the items skipped by that were not flown."""

@@ -19,6 +19,7 @@ from uav_task_alloc.model import Point
 
 _BLIND = 30.0  # [s] to wait for a position that shows where it is after a claim
 _FRAMES_AFTER = 10  # frames after MISSION_CURRENT in which REACHED may follow
+_COUNTED = 2.0  # [s] for which a vehicle is at an item, at most, before it goes on to the next
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +180,12 @@ class PassedItems:
 
 def _current_since(item: Item, claim: Claim) -> float:
     """Vehicle time [s] from which an item of a claim may have been flown: while it is current."""
-    return claim.since if item is claim.first else max(claim.since, claim.others_since)
+    if item is not claim.first:
+        return max(claim.since, claim.others_since)
+    if claim.in_flight:
+        return claim.since
+    # the mission was left: an item that stayed current long after it was passed was not flown
+    return max(claim.since, claim.others_since - item.params[0] - _COUNTED)
 
 
 def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:

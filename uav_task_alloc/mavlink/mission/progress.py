@@ -224,7 +224,7 @@ class ProgressTable:
     def invalidate(self) -> None:
         """End the epoch: the mission on board is unknown."""
         self.end_before_restart.note_restart(self._stepped_at)
-        self._moves.invalidate()
+        self._moves.invalidate(self._stepped_at)
         self._reached.last = None
         self._epochs.clear()
         self._epochs.series.clear()
