@@ -64,6 +64,11 @@ def test_a_way_that_was_followed_is_covered():
     assert Flown(turned=True).fly(at(300, 300), at(300, 0), at(0, 0)).covered
 
 
+@pytest.mark.parametrize(('beside', 'covered'), [(8.0, True), (12.0, False)])
+def test_a_way_is_followed_within_10_m(beside, covered):
+    assert Flown().fly(at(0, beside), at(300, beside), at(300, 300)).covered is covered
+
+
 def test_a_way_that_was_cut_short_is_not_covered():
     flown = Flown().fly(at(0, 0), at(200, 0), at(300, 300))
     assert not flown.covered

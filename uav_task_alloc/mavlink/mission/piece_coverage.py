@@ -27,7 +27,7 @@ from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.mavlink.mission.task_list import MissionStop
 from uav_task_alloc.model import Point
 
-_CORRIDOR, _CORRIDOR_PLANE = 15.0, 150.0  # [m] from a way at which a vehicle still follows it
+_CORRIDOR, _CORRIDOR_PLANE = 10.0, 150.0  # [m] from a way at which a vehicle still follows it
 _SLACK = 10.0  # [m] of positions that are not exact
 _RECENT = 32  # positions: six seconds, by which the report of the current item may be late
 _MARGIN = 1.2  # of a speed
