@@ -49,6 +49,21 @@ def test_what_can_be_reached_is_covered_and_no_way_enters_a_zone(seed):
     assert pieces == pieces_of(work, zones, clearance)
 
 
+def test_no_way_leads_into_a_notch_that_is_narrower_than_the_margins():
+    work = field([(-100.0, -100.0), (100.0, -100.0), (100.0, 100.0), (-100.0, 100.0)], 4.0,
+                 direction=math.pi / 2)
+    notched = [(-60.0, -40.0), (60.0, -40.0), (60.0, 40.0), (5.0, 40.0), (4.0, 0.0), (3.0, 30.0),
+               (0.0, 5.0), (-5.0, 40.0), (-60.0, 40.0)]
+    zone = ThreatZone.polygon('z', notched, 0.0, 100.0, 2.0)
+    assert all(path_is_clear(piece.path, [zone], 5.0) for piece in pieces_of(work, [zone], 5.0))
+
+
+@pytest.mark.parametrize('seed', [5813127, 5813191])
+def test_no_way_leads_into_a_notch_of_a_random_zone(seed):
+    work, zones = random_field(random.Random(seed))
+    assert all(path_is_clear(piece.path, zones, 5.0) for piece in pieces_of(work, zones, 5.0))
+
+
 def test_a_strip_that_meets_a_hole_is_cut_in_two():
     hole = [(100.0, 50.0), (200.0, 50.0), (200.0, 150.0), (100.0, 150.0)]
     pieces = pieces_of(field(SQUARE, 50.0, [hole], direction=0.0))

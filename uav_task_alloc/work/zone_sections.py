@@ -12,6 +12,7 @@ from uav_task_alloc.model import Point, Shape, ThreatZone
 PlaneRing = Sequence[XY]
 Span = tuple[float, float]
 _CORNERS = 72  # of a circle: its polygon exceeds it by 0.1 % of the radius
+_FEW_CORNERS = 16  # of a circle around a corner: exceeds it by 2 %
 _SKIN = 0.03  # [m] further out, so that rounding never puts a way inside
 
 
@@ -25,32 +26,55 @@ def sections(zones: Iterable[ThreatZone], low: float, high: float,
         clearance: [m].
 
     Returns:
-        A ring for each zone that reaches into the range, which encloses it.
+        Rings for each zone that reaches into the range, which enclose it together.
     """
-    rings = [_section(zone, low, high, clearance) for zone in zones]
-    return [ring for ring in rings if ring]
+    return [ring for zone in zones for ring in _section(zone, low, high, clearance)]
 
 
-def _section(zone: ThreatZone, low: float, high: float, clearance: float) -> PlaneRing:
+def _section(zone: ThreatZone, low: float, high: float, clearance: float) -> list[PlaneRing]:
+    """The rings of one zone; none where it does not reach into the range."""
     grow = zone.margin + clearance
     if zone.shape is Shape.HEMISPHERE:
         base, reach = zone.center[2], zone.radius + grow
         if high < base - grow or low >= base + reach:
-            return ()
-        return _circle(zone.center, math.sqrt(reach**2 - max(0.0, low - base)**2))
+            return []
+        return [_circle(zone.center, math.sqrt(reach**2 - max(0.0, low - base)**2))]
     if high <= zone.z_min - grow or low >= zone.z_max + grow:
-        return ()
+        return []
     if zone.shape is Shape.CYLINDER:
-        return _circle(zone.center, zone.radius + grow)
+        return [_circle(zone.center, zone.radius + grow)]
     from uav_task_alloc.geometry.zones import outline  # imports numba
-    return outline(zone, clearance)
+    return [outline(zone, clearance), *_around_edges(zone.vertices, grow)]
 
 
-def _circle(center: Point, radius: float) -> PlaneRing:
+def _around_edges(corners: Sequence[XY], grow: float) -> list[PlaneRing]:
+    """Rings around what is near the edges of a polygon that is not convex; else none.
+
+    In a notch that is narrower than twice `grow` [m] the rim of the polygon crosses itself, and
+    leaves out a part of what it should enclose.
+    """
+    turns = {_turns_left(a, b, c) for a, b, c in zip(
+        corners, [*corners[1:], corners[0]], [*corners[2:], *corners[:2]], strict=True)}
+    if len(turns) == 1:
+        return []
+    boxes: list[PlaneRing] = []
+    for a, b in edges(corners):
+        length = math.dist(a, b)
+        aside = [(grow + _SKIN) * (a[1] - b[1]) / length, (grow + _SKIN) * (b[0] - a[0]) / length]
+        boxes.append([(x + sign * aside[0], y + sign * aside[1])
+                      for (x, y), sign in ((a, -1.0), (b, -1.0), (b, 1.0), (a, 1.0))])
+    return boxes + [_circle(corner, grow, _FEW_CORNERS) for corner in corners]
+
+
+def _turns_left(a: XY, b: XY, c: XY) -> bool:
+    return (b[0] - a[0]) * (c[1] - b[1]) > (b[1] - a[1]) * (c[0] - b[0])
+
+
+def _circle(center: Sequence[float], radius: float, corners: int = _CORNERS) -> PlaneRing:
     """A polygon around a circle, counter-clockwise."""
-    reach = (radius + _SKIN) / math.cos(math.pi / _CORNERS)
+    reach = (radius + _SKIN) / math.cos(math.pi / corners)
     return [(center[0] + reach * math.cos(angle), center[1] + reach * math.sin(angle))
-            for angle in (2 * math.pi * k / _CORNERS for k in range(_CORNERS))]
+            for angle in (2 * math.pi * k / corners for k in range(corners))]
 
 
 def free_parts(a: Point, b: Point, zones: Iterable[ThreatZone],
@@ -94,8 +118,8 @@ def _inside(a: Point, b: Point, zone: ThreatZone, clearance: float) -> list[Span
     if zone.shape is Shape.HEMISPHERE:
         spans = _in_ball(a, b, zone.center, zone.radius + grow + _SKIN)
     else:
-        ring = _section(zone, -math.inf, math.inf, clearance)
-        spans = ring_spans((a[0], a[1]), (b[0], b[1]), [ring])
+        rings = _section(zone, -math.inf, math.inf, clearance)
+        spans = ring_spans((a[0], a[1]), (b[0], b[1]), rings)
     return [(max(s, start), min(t, end)) for s, t in spans if s < end and t > start]
 
 
