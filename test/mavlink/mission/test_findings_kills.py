@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is still to be judged when the bridge is killed, or another mission is read, is known."""
 import pytest
-from authority_bench import BOTH, MODES, PX4, flying
+from authority_bench import ARDUPILOT, BOTH, MODES, PX4, flying
 from evidence_bench import Flight
-from findings_bench import distance, drop_messages, flown_once_each
+from findings_bench import distance, drop_messages, flown_once_each, happened
 from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -168,3 +168,18 @@ def test_a_reached_received_while_the_mission_was_read_again_is_no_evidence_afte
     bench.vehicles[1].reboot(bench.now)
     bench.run(limit=12.0)
     assert bench.completed() == ['A']
+
+
+@ARDUPILOT
+def test_a_mission_that_ended_before_its_appended_items_came_is_started_after_a_kill(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: places(bench) == ['A'])
+    bench.run(lambda: distance(bench, (100.0, 100.0, 50.0)) < 20.0)
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT',
+                  lambda m: m.seq > 2 and not happened(bench, 'mission_end'))
+    bench.assign(task_list('BCD', 2))
+    assert bench.run(lambda: len(bench.vehicles[1].flight.items) == 5, 40.0)
+    bench.kill_and_restart(0.0)
+    bench.assign(task_list('CD', 3))
+    assert bench.run(lambda: bench.completed()[-2:] == ['C', 'D'], 60.0)
+    assert places(bench) == list('ABCD')

@@ -129,10 +129,14 @@ class ListExecution:
         return sender.set_mode(ModeFunction.MISSION, now)
 
     def _mission_ended(self) -> bool:
-        """Whether ArduPilot has ended its mission and does not start the appended items."""
+        """Whether ArduPilot has ended its mission and does not start the appended items.
+
+        It does not either where the current item was set after the end.
+        """
         telemetry, progress = self._telemetry, self._onboard.progress
-        return (not self._profile.atomic and telemetry.current is not None
-                and telemetry.mission_state == d.MISSION_STATE_COMPLETE
-                and not progress.finished and progress.active is not None
-                and telemetry.current_at > self._onboard.verified_at
-                and telemetry.current - self._onboard.own < len(progress.items) - 1)
+        if self._profile.atomic or telemetry.current is None or progress.finished or (
+                progress.active is None or telemetry.current_at <= self._onboard.verified_at):
+            return False
+        return (telemetry.mission_stopped and telemetry.airborne) or (
+            telemetry.mission_state == d.MISSION_STATE_COMPLETE
+            and telemetry.current - self._onboard.own < len(progress.items) - 1)

@@ -80,7 +80,7 @@ class Telemetry:
         self.total: int | None = None  # number of items as the vehicle reports it
         self.mission_state = 0  # MISSION_STATE
         self._mode_frame = self._in_mission_frame = 0  # numbers; shows the mode, MISSION (CURRENT)
-        self.mission_restarted = self.mission_ended = False  # by the last MISSION_CURRENT
+        self.mission_restarted = self.mission_ended = self.mission_stopped = False  # by reports
         self.plan_id = 0  # PX4's id of the onboard mission
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
@@ -328,6 +328,9 @@ class Telemetry:
                 self.mission_state == d.MISSION_STATE_ACTIVE)
             self.mission_ended = self.mission_state == complete and (
                 before not in (complete, d.MISSION_STATE_UNKNOWN))
+            # not flown, though it is in mission mode
+            self.mission_stopped = self.mission_state == d.MISSION_STATE_PAUSED and (
+                message.mission_mode == _IN_MISSION)
             if message.mission_mode == _IN_MISSION:
                 self._in_mission_frame = self.frame
         self.plan_id = plan_id(message)
