@@ -183,3 +183,20 @@ def test_a_mission_that_ended_before_its_appended_items_came_is_started_after_a_
     bench.assign(task_list('CD', 3))
     assert bench.run(lambda: bench.completed()[-2:] == ['C', 'D'], 60.0)
     assert places(bench) == list('ABCD')
+
+
+@ARDUPILOT
+@pytest.mark.parametrize(('metres', 'known'), [(16.0, True), (45.0, False)])
+def test_a_reached_before_the_first_position_is_of_a_place_from_which_it_can_have_flown_since(
+        kind, metres, known):
+    bench, at_b = flying(kind, 'ABCD'), (100.0, 100.0, 50.0)
+    assert bench.run(lambda: places(bench) == ['A'])
+    bench.run(lambda: distance(bench, at_b) < 10.0)
+    bench.kill_and_restart(0.0, store=False)
+    drop_messages(bench, 'down', 'GLOBAL_POSITION_INT',
+                  lambda m: len(places(bench)) == 1 or distance(bench, at_b) < metres)
+    drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: distance(bench, at_b) < 60.0)
+    bench.assign(task_list('BCD', 2))
+    assert bench.run(lambda: distance(bench, at_b) > 60.0, 30.0)
+    bench.run(limit=4.0)
+    assert ('B' in bench.completed()) is known

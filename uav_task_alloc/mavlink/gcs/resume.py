@@ -121,7 +121,7 @@ class Resume:
                 reached.current_after = max(seq, reached.current_after or 0)
             if reached.place is None and self._telemetry.has_position and (
                     now - reached.at < _PLACE_DELAY):
-                reached.place = self._telemetry.position
+                reached.place_later(self._telemetry.position, self._telemetry.speed, now)
 
     def note_reached(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_ITEM_REACHED, until the vehicle is located."""
@@ -147,16 +147,17 @@ class Resume:
         if reached.seq == reached.current_after:  # the last one, which may be still ahead
             return item.position is not None and self._progress.path.visited_at(
                 item.position, item.radius, -math.inf) is not None
-        return self._was_near(item, reached.place)
+        return self._was_near(item, reached)
 
-    def _was_near(self, item: Item, place: Point | None) -> bool:
-        """Whether an item is near a position; None: near any position received so far."""
+    def _was_near(self, item: Item, reached: UnreadReached) -> bool:
+        """Whether an item is near the place of a REACHED, or any position received so far."""
         if item.position is None:
             return False
-        if place is None:
+        if reached.place is None:
             return self._progress.path.visited_at(
                 item.position, item.radius + LOOSE_RADIUS, -math.inf) is not None
-        return math.dist(item.position, place) <= item.radius + LOOSE_RADIUS
+        return math.dist(item.position, reached.place) <= (
+            item.radius + LOOSE_RADIUS + reached.flown_since)
 
     def awaits_position(self, held: tuple[Item, ...], read_at: float, now: float) -> bool:
         """Whether what locates the vehicle is still to come; on the ground nothing is needed.

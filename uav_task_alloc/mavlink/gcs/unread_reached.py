@@ -2,6 +2,7 @@
 """A MISSION_ITEM_REACHED received before the mission on board was read."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from uav_task_alloc.mavlink.mission.items import Item
@@ -17,6 +18,18 @@ class UnreadReached:
     frame: int  # its number
     place: Point | None  # [m] ENU of the vehicle; None: not known
     current_after: int | None = None  # the largest current item reported since
+    flown_since: float = 0.0  # [m] that it may have flown from the item to `place`
+
+    def place_later(self, place: Point, speed: float, now: float) -> None:
+        """Take a position that came after the REACHED, as none had come before.
+
+        Args:
+            place: of the vehicle [m] ENU.
+            speed: of the vehicle [m/s]; NaN: not known.
+            now: steady time [s].
+        """
+        self.place = place
+        self.flown_since = 0.0 if math.isnan(speed) else speed * (now - self.at)
 
     def may_be_of(self, held: tuple[Item, ...], repeats: bool) -> bool:
         """Whether the current item was past it then; a repetition of another mission may not.
