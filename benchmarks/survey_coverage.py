@@ -7,12 +7,14 @@ Half of the fields have no holes and zones. Each is cut by `pieces_of`; the rast
 holes and zones by its own formulas, and what rectangles around the ways have covered. With
 `pip install --no-deps drone-flightplan shapely pyproj geojson` the total way of one UAV over each
 field without holes is compared with that of drone-flightplan for the same distance of strips (its
-photos a quarter of it apart): our strips in their order, each from its nearer end, or with
-`--solver` in the order that `plan` finds in so many seconds. The last line is one JSON object:
-`fields`, `least_share`, `below` (of 99.5 %), `entered` (ways inside zones), `pieces` (median),
-`seconds` (longest to cut), `compared`, `ratio_median`, `ratio_worst`, `shorter` (share), and
-`their_share` (covered by the public planner, median), `ratio_by_area` (of ways by what they have
-covered, median).
+photos a quarter of it apart): from the begin of the first strip to the end of the last, turns
+without radius. Ours are in their order, each from its nearer end, or with `--solver` in the order
+that `plan` finds in so many seconds, from the best of four ends of the outer strips; then also
+with the ways from a corner of the field and back to it, for both. The last line is one JSON
+object: `fields`, `least_share`, `below` (of 99.5 %), `entered` (ways inside zones), `pieces`
+(median), `seconds` (longest to cut), `compared`, `ratio_median`, `ratio_worst`, `shorter` (share),
+and `their_share` (covered by the public planner, median), `ratio_by_area` (of ways by what they
+have covered, median), `ratio_from_corner` (median, with the ways from and to a corner).
 """
 import argparse
 import json
@@ -58,16 +60,26 @@ def public_planner():
 
 def own_length(pieces, budget):
     """Way [m] from the begin of the first strip to the end of the last."""
+    snake = snake_length([list(piece.path) for piece in pieces])
     if not budget:
-        return snake_length([list(piece.path) for piece in pieces])
+        return snake
     from uav_task_alloc import Uav, plan
-    start = Uav('u', pieces[0].position)
-    found = plan([start], pieces, budget=budget, seed=1)
-    return found.distance - found.legs['u'][0].length
+    starts = {end for piece in (pieces[0], pieces[-1]) for end in (piece.path[0], piece.path[-1])}
+    found = [plan([Uav('u', start)], pieces, budget=budget / len(starts), seed=1)
+             for start in sorted(starts)]
+    return min(snake, *(each.distance - each.legs['u'][0].length for each in found))
+
+
+def ratio_from_corner(work, pieces, other, budget):
+    """Ratio of the ways from the first corner over all strips and back to it."""
+    from uav_task_alloc import Uav, plan
+    corner = work.path[0]
+    own = plan([Uav('u', corner)], pieces, budget=budget, seed=1, route_end='home').distance
+    return own / sum(dist(a, b) for a, b in pairwise([corner[:2], *other, corner[:2]]))
 
 
 def measure(seed, plain, planner, budget):
-    """One field: share covered, ways in zones, pieces, seconds, ratio of ways, their share."""
+    """One field: share, ways in zones, pieces, seconds, ratio, their share, from a corner."""
     rng = random.Random(seed)
     work, zones = random_field(rng, *((0, 0) if plain else (3, 4)))
     clearance = rng.choice((0.0, 5.0))
@@ -79,11 +91,12 @@ def measure(seed, plain, planner, budget):
         raster.fly(piece.path, work.strip_width)
     entered = sum(not path_is_clear(piece.path, zones, clearance) for piece in pieces)
     if not plain or planner is None:
-        return raster.share(), entered, len(pieces), seconds, None, None
+        return raster.share(), entered, len(pieces), seconds, None, None, None
     other, theirs = planner(work), Raster(work, (), 0.0, 600)
     theirs.fly(other, work.strip_width)
     way, public = own_length(pieces, budget), sum(dist(a, b) for a, b in pairwise(other))
-    return raster.share(), entered, len(pieces), seconds, way / public, theirs.share()
+    corner = ratio_from_corner(work, pieces, other, budget) if budget else None
+    return raster.share(), entered, len(pieces), seconds, way / public, theirs.share(), corner
 
 
 def main():
@@ -111,6 +124,8 @@ def main():
             'ratio_by_area': round(statistics.median(
                 r[4] * r[5] / r[0] for r in rows if r[4] is not None), 3),
             'shorter': round(sum(ratio <= 1.0 for ratio in ratios) / len(ratios), 3),
+            **({'ratio_from_corner': round(statistics.median(
+                row[6] for row in rows if row[6] is not None), 3)} if args.solver else {}),
         } if ratios else {})}))
 
 

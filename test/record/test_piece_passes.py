@@ -3,7 +3,7 @@
 import pytest
 
 from uav_task_alloc.cli.report import run_summary
-from uav_task_alloc.record.ground_truth import GroundTruth, TrueSample
+from uav_task_alloc.record.ground_truth import GroundTruth, Reached, TrueSample
 from uav_task_alloc.record.piece_passes import piece_passes, served
 from uav_task_alloc.record.run_state import RunState
 
@@ -66,3 +66,27 @@ def test_a_strip_that_a_lost_vehicle_began_is_not_flown_twice(last, twice):
     truth.tracks['lost'] = [TrueSample(20.0 * k, (x, 40.0, 50.0))
                             for k, x in enumerate((-20.0, last))]
     assert run_summary(run(), truth)['tasks_flown_twice'] == twice
+
+
+@pytest.mark.parametrize(('items', 'twice'), [
+    ((), []),  # on its way to something else
+    ((-20.0,), []), ((200.0,), []),
+    ((0.0, 200.0), ['field#1'])])
+def test_a_second_pass_without_items_at_both_ends_leads_elsewhere(items, twice):
+    truth = flown(*BOTH)
+    truth.reached = [Reached('u1', wall, (x, y, 50.0)) for wall, x, y in (
+        (1.8, 0.0, 40.0), (20.0, 200.0, 40.0), (40.0, 200.0, 80.0), (58.0, 0.0, 80.0))]
+    truth.tracks['u2'] = [TrueSample(500.0, (-20.0, 40.0, 50.0)),
+                          TrueSample(520.0, (220.0, 40.0, 50.0))]
+    truth.reached += [Reached('u2', 500.0 + (x + 20.0) / 12.0, (x, 40.0, 50.0)) for x in items]
+    assert run_summary(run(), truth)['flown_twice'] == twice
+
+
+def test_a_corner_that_is_overshot_does_not_end_a_pass():
+    made = run()
+    made.ways['field#1'] = [(0.0, 40.0, 50.0), (20.0, 40.0, 50.0), (20.0, 60.0, 50.0),
+                            (200.0, 60.0, 50.0)]
+    corners = (-20, 40), (27, 44), (20, 62), (200, 60), (200, 80), (-20, 80)
+    assert [len(rows) for rows in piece_passes(made, flown(*corners)).values()] == [1, 1]
+    corners = (-20, 40), (38, 44), (20, 62), (200, 60), (200, 80), (-20, 80)
+    assert [len(rows) for rows in piece_passes(made, flown(*corners)).values()] == [0, 1]

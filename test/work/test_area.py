@@ -49,6 +49,42 @@ def test_what_can_be_reached_is_covered_and_no_way_enters_a_zone(seed):
     assert pieces == pieces_of(work, zones, clearance)
 
 
+def test_strips_are_as_wide_as_allowed_where_that_shortens_them():
+    ends = [(0.0, 0.0), (400.0, 0.0), (200.0, 170.0)]  # 4.25 strips high
+    pieces = pieces_of(field(ends, 40.0, direction=0.0))
+    assert [piece.position[1] for piece in pieces] == pytest.approx(
+        [20.0, 60.0, 100.0, 140.0, 165.0])
+    even = sum(400.0 * (1.0 - k / 5) for k in range(5))
+    assert sum(piece.path_length for piece in pieces) < 0.9 * even
+    assert covered(ends, 40.0) >= 0.995
+
+
+def test_strips_are_equal_where_that_is_not_longer():
+    pieces = pieces_of(field([(0.0, 0.0), (400.0, 0.0), (400.0, 170.0), (0.0, 170.0)], 40.0))
+    assert [piece.position[1] for piece in pieces] == pytest.approx(
+        [17.0, 51.0, 85.0, 119.0, 153.0])
+
+
+@pytest.mark.parametrize('slant', [50.0, 150.0, 400.0])
+def test_pointed_ends_are_left_out_as_far_as_the_field_is_still_covered(slant):
+    ends = [(0.0, 0.0), (400.0, 0.0), (400.0 + slant, 200.0), (slant, 200.0)]
+    whole = 400.0 + slant / 5  # of a strip
+    pieces = pieces_of(field(ends, 40.0, direction=0.0))
+    lengths = [piece.path_length for piece in pieces]
+    assert lengths == pytest.approx([lengths[0]] * 5)  # all ends alike
+    assert lengths[0] < whole - 0.2 * slant / 5
+    assert 0.996 <= covered(ends, 40.0) <= 0.9975
+
+
+def test_a_field_that_zones_cover_mostly_is_covered_as_well():
+    work, zones = random_field(random.Random(4711097))  # a quarter of its box is free
+    clearance = 5.0
+    raster = Raster(work, zones, clearance, 600)
+    for piece in pieces_of(work, zones, clearance):
+        raster.fly(piece.path, work.strip_width)
+    assert raster.share() >= 0.996
+
+
 def test_no_way_leads_into_a_notch_that_is_narrower_than_the_margins():
     work = field([(-100.0, -100.0), (100.0, -100.0), (100.0, 100.0), (-100.0, 100.0)], 4.0,
                  direction=math.pi / 2)
@@ -62,6 +98,15 @@ def test_no_way_leads_into_a_notch_that_is_narrower_than_the_margins():
 def test_no_way_leads_into_a_notch_of_a_random_zone(seed):
     work, zones = random_field(random.Random(seed))
     assert all(path_is_clear(piece.path, zones, 5.0) for piece in pieces_of(work, zones, 5.0))
+
+
+def covered(outer, width):
+    """Share of a field that its strips along x cover."""
+    work = field(outer, width, direction=0.0)
+    raster = Raster(work, (), 0.0, 600)
+    for piece in pieces_of(work):
+        raster.fly(piece.path, width)
+    return raster.share()
 
 
 def test_a_strip_that_meets_a_hole_is_cut_in_two():

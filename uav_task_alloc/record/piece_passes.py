@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 from uav_task_alloc.geometry.polyline import polyline_length, segment_distance
@@ -14,7 +14,8 @@ from uav_task_alloc.record.run_state import RunState
 
 _BESIDE = 5.0  # [m] from a way, within which a vehicle flies along it
 _SHARE = 0.8  # of a way that a pass covers at least
-_CORNER = 6.0  # [m] that a vehicle may cut at each end
+_CORNER = 6.0  # [m] that a vehicle may cut at each end, or overshoot at a corner
+_MOMENT = 3.0  # [s] before and after a pass in which items at its ends are reached
 
 
 def served(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]]:
@@ -46,22 +47,32 @@ def piece_passes(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]
         truth: with all tracks.
 
     Returns:
-        By id of the piece. A pass stays within 5 m of the way for four fifths of it and comes
-        near both ends: one that a lost vehicle did not finish is none.
+        By id of the piece. A pass stays within 5 m of the way, 11 m at its corners, for four
+        fifths of it and comes near both ends: one that a lost vehicle did not finish is none. Of
+        several, one without mission items at both ends leads elsewhere, and does not count.
     """
     tracks = {uav: [TrueSample(wall, point) for wall, point in resampled(track)]
               for uav, track in truth.tracks.items()}
-    return {piece: sorted((Reached(uav, wall, state.ways[piece][-1])
-                           for uav, track in tracks.items()
-                           for wall in _passes(track, state.ways[piece])),
-                          key=lambda row: row.wall)
+    return {piece: _of_piece(tracks, truth.reached, state.ways[piece])
             for piece, status in state.pieces.items()
             if status.state == 'COMPLETED' and piece in state.ways}
 
 
-def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[float]:
-    """[unix s] at which passes along a way end."""
-    low, high = ([pick(p[k] for p in way) + sign * _BESIDE for k in range(3)]
+def _of_piece(tracks: Mapping[str, Sequence[TrueSample]], reached: Sequence[Reached],
+              way: Sequence[Point]) -> list[Reached]:
+    """The ends of passes along a way, in order of time."""
+    found = sorted(((uav, first, last) for uav, track in tracks.items()
+                    for first, last in _passes(track, way)), key=lambda row: row[2])
+    own = [(uav, first, last) for uav, first, last in found if all(
+        any(row.uav == uav and first - _MOMENT <= row.wall <= last + _MOMENT
+            and math.dist(row.point, end) <= _BESIDE for row in reached)
+        for end in (way[0], way[-1]))]
+    return [Reached(uav, last, way[-1]) for uav, _, last in own or found]
+
+
+def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[tuple[float, float]]:
+    """[unix s] at which passes along a way begin and end."""
+    low, high = ([pick(p[k] for p in way) + sign * (_BESIDE + _CORNER) for k in range(3)]
                  for pick, sign in ((min, -1.0), (max, 1.0)))
     along = list[TrueSample]()
     for sample in track:
@@ -70,12 +81,12 @@ def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[float
             along.append(sample)
             continue
         if along and _is_whole(along, way):
-            yield along[-1].wall
+            yield along[0].wall, along[-1].wall
         along.clear()
     # a vehicle that was lost on the way has cut no corner after it
     if along and _is_whole(along, way) and min(
             math.dist(along[-1].point, end) for end in (way[0], way[-1])) <= _BESIDE:
-        yield along[-1].wall
+        yield along[0].wall, along[-1].wall
 
 
 def _is_whole(along: Sequence[TrueSample], way: Sequence[Point]) -> bool:
@@ -88,4 +99,5 @@ def _is_whole(along: Sequence[TrueSample], way: Sequence[Point]) -> bool:
 
 
 def _is_beside(point: Point, way: Sequence[Point]) -> bool:
-    return any(segment_distance(point, a, b) <= _BESIDE for a, b in pairwise(way))
+    return any(segment_distance(point, a, b) <= _BESIDE for a, b in pairwise(way)) or any(
+        math.dist(point, corner) <= _BESIDE + _CORNER for corner in way[1:-1])
