@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Work counts as flown where vehicles truly flew along all its pieces, and each pass counts."""
+from dataclasses import replace
+
 import pytest
 
 from uav_task_alloc.cli.report import run_summary
@@ -82,11 +84,16 @@ def test_a_second_pass_without_items_at_both_ends_leads_elsewhere(items, twice):
     assert run_summary(run(), truth)['flown_twice'] == twice
 
 
-def test_a_corner_that_is_overshot_does_not_end_a_pass():
+@pytest.mark.parametrize(('speedup', 'passes'), [(5, 1), (1, 0)])
+def test_a_corner_that_is_overshot_for_a_moment_does_not_end_a_pass(speedup, passes):
     made = run()
     made.ways['field#1'] = [(0.0, 40.0, 50.0), (20.0, 40.0, 50.0), (20.0, 60.0, 50.0),
                             (200.0, 60.0, 50.0)]
-    corners = (-20, 40), (27, 44), (20, 62), (200, 60), (200, 80), (-20, 80)
-    assert [len(rows) for rows in piece_passes(made, flown(*corners)).values()] == [1, 1]
-    corners = (-20, 40), (38, 44), (20, 62), (200, 60), (200, 80), (-20, 80)
-    assert [len(rows) for rows in piece_passes(made, flown(*corners)).values()] == [0, 1]
+    truth = flown((-20, 40), (38, 40), (20, 62), (200, 60), (200, 80), (-20, 80))
+    truth.tracks['u1'] = [replace(each, wall=each.wall / speedup) for each in truth.tracks['u1']]
+    assert [len(rows) for rows in piece_passes(made, truth).values()] == [passes, 1]
+
+
+def test_a_strip_that_was_left_in_between_is_not_flown():
+    ways = (-20, 40), (60, 40), (60, 70), (140, 70), (140, 40), (200, 40), (200, 80), (-20, 80)
+    assert [len(rows) for rows in piece_passes(run(), flown(*ways)).values()] == [0, 1]

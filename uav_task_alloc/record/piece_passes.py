@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
-from uav_task_alloc.geometry.polyline import polyline_length, segment_distance
+from uav_task_alloc.geometry.polyline import point_at, polyline_length, segment_distance
 from uav_task_alloc.model import Point
 from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.ground_truth import GroundTruth, Reached, TrueSample, resampled, visits
@@ -14,7 +14,9 @@ from uav_task_alloc.record.run_state import RunState
 
 _BESIDE = 5.0  # [m] from a way, within which a vehicle flies along it
 _SHARE = 0.8  # of a way that a pass covers at least
-_CORNER = 6.0  # [m] that a vehicle may cut at each end, or overshoot at a corner
+_CORNER = 6.0  # [m] that a vehicle may cut at each end
+_ASIDE = 10.0  # [s] that a vehicle may be further off: it overshoots a corner, or stops for a list
+_STEP = 2.0  # [m] between points of a way that are checked
 _MOMENT = 3.0  # [s] before and after a pass in which items at its ends are reached
 
 
@@ -47,9 +49,10 @@ def piece_passes(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]
         truth: with all tracks.
 
     Returns:
-        By id of the piece. A pass stays within 5 m of the way, 11 m at its corners, for four
-        fifths of it and comes near both ends: one that a lost vehicle did not finish is none. Of
-        several, one without mission items at both ends leads elsewhere, and does not count.
+        By id of the piece. A pass comes within 5 m of four fifths of the way and near both ends,
+        and is never further off for more than 10 s: one that a lost vehicle did not finish is
+        none. Of several, one without mission items at both ends leads elsewhere, and does not
+        count.
     """
     tracks = {uav: [TrueSample(wall, point) for wall, point in resampled(track)]
               for uav, track in truth.tracks.items()}
@@ -72,17 +75,21 @@ def _of_piece(tracks: Mapping[str, Sequence[TrueSample]], reached: Sequence[Reac
 
 def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[tuple[float, float]]:
     """[unix s] at which passes along a way begin and end."""
-    low, high = ([pick(p[k] for p in way) + sign * (_BESIDE + _CORNER) for k in range(3)]
+    low, high = ([pick(p[k] for p in way) + sign * _BESIDE for k in range(3)]
                  for pick, sign in ((min, -1.0), (max, 1.0)))
-    along = list[TrueSample]()
+    along, left = list[TrueSample](), False
     for sample in track:
         inside = all(a <= v <= b for a, v, b in zip(low, sample.point, high, strict=True))
         if inside and _is_beside(sample.point, way):
             along.append(sample)
-            continue
-        if along and _is_whole(along, way):
+            left = False
+        elif along and not left and _is_whole(along, way):
             yield along[0].wall, along[-1].wall
-        along.clear()
+            along.clear()
+        elif along and sample.wall - along[-1].wall > _ASIDE:
+            along.clear()
+        else:
+            left = True
     # a vehicle that was lost on the way has cut no corner after it
     if along and _is_whole(along, way) and min(
             math.dist(along[-1].point, end) for end in (way[0], way[-1])) <= _BESIDE:
@@ -91,13 +98,19 @@ def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[tuple
 
 def _is_whole(along: Sequence[TrueSample], way: Sequence[Point]) -> bool:
     """Whether samples beside a way are a pass from one end to the other."""
-    length = polyline_length(way)
-    return polyline_length([each.point for each in along]) >= min(
-        _SHARE * length, length - 2.0 * _CORNER) and all(
-        min(math.dist(each.point, end) for each in along) <= _BESIDE + _CORNER
-        for end in (way[0], way[-1]))
+    if any(min(math.dist(each.point, end) for each in along) > _BESIDE + _CORNER
+           for end in (way[0], way[-1])):
+        return False
+    length, missed = polyline_length(way), 0.0
+    for a, b in pairwise(way):
+        parts = max(1, math.ceil(math.dist(a, b) / _STEP))
+        near = [each.point for each in along if segment_distance(each.point, a, b) <= _BESIDE]
+        for k in range(parts):
+            point = point_at(a, b, (k + 0.5) / parts)
+            if not any(math.dist(point, other) <= _BESIDE + _STEP for other in near):
+                missed += math.dist(a, b) / parts
+    return missed <= max((1.0 - _SHARE) * length, 2.0 * _CORNER)
 
 
 def _is_beside(point: Point, way: Sequence[Point]) -> bool:
-    return any(segment_distance(point, a, b) <= _BESIDE for a, b in pairwise(way)) or any(
-        math.dist(point, corner) <= _BESIDE + _CORNER for corner in way[1:-1])
+    return any(segment_distance(point, a, b) <= _BESIDE for a, b in pairwise(way))
