@@ -375,3 +375,13 @@ def test_a_place_near_a_turn_was_not_reached_in_a_gap_too_short_to_fly_there(spe
     path.add(PositionSample(2.6, (8.0, 0.0, 50.0), (later, 0.0, 0.0)))
     assert path.could_have_flown(
         [(26.0, 0.0, 50.0)], (-300.0, 0.0, 50.0), 0.0, 0.0) is flown
+
+
+@pytest.mark.parametrize(('y', 'flown'), [
+    (0.0, False), (6.0, False), (11.5, True), (17.0, True)])  # it turns at y = 15
+def test_beside_a_leg_on_the_inner_side_of_the_turn_it_may_have_flown_straight(y, flown):
+    path = FlownPath()
+    path.add(PositionSample(0.0, (-150.0, 0.0, 50.0), (15.0, 0.0, 0.0)))
+    path.add(PositionSample(12.0, (30.0, y, 50.0), (15.0, 0.0, 0.0)))
+    assert path.could_have_flown(
+        [(0.0, 15.0, 50.0)], (150.0, 0.0, 50.0), 0.0, 0.0) is flown

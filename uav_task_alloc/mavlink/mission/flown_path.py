@@ -23,6 +23,7 @@ _JUMP = 30.0  # [m] beyond the distance its speed explains: the estimate jumped
 _FEW, _USUAL_SPEED = 100, 15.0  # samples; [m/s] assumed where there are fewer
 _ACCELERATION = 6.0  # [m/s2] that no vehicle exceeds for seconds (PX4: MPC_ACC_HOR_MAX 5)
 _CORRIDOR = 8.0  # [m] from a leg at which a vehicle flies it
+_INSIDE = 2.5  # [m] from a leg on the inner side of the turn before it, where it cuts the corner
 _HOLD_SLACK = 0.1  # [s] by which a sampled hold may be shorter than the real one
 _AHEAD = 1.0  # [s] after the newest sample, in which a vehicle keeps its velocity
 
@@ -172,7 +173,7 @@ class FlownPath:
         for a, b in pairwise(self._since(since)):
             if b.t - a.t > GAP and polyline_length((a.position, *chain, b.position)) <= (
                     _longest_way(a, b, 1.1 * fastest, b.t - a.t - 0.8 * holds)) + 10.0 and (
-                    anywhere or _on_leg(b.position, chain[-1], then, home)):
+                    anywhere or _on_leg(b.position, (a.position, *chain), then, home)):
                 return True
         return False
 
@@ -228,11 +229,29 @@ def _longest_way(a: PositionSample, b: PositionSample, fastest: float, time: flo
     return ramps + top * max(0.0, time - (2.0 * top - first - last) / _ACCELERATION)
 
 
-def _on_leg(point: Point, start: Point, then: Point | None, home: Point | None) -> bool:
-    """Whether it flies from `start` to the next point, or home at any height."""
+def _on_leg(point: Point, flown: Sequence[Point], then: Point | None,
+            home: Point | None) -> bool:
+    """Whether it flies from the last point flown to the next one, or home at any height."""
+    start = flown[-1]
     if home is not None:
         return segment_distance(point[:2], start[:2], home[:2]) <= _CORRIDOR
-    return segment_distance(point, start, then or start) <= _CORRIDOR
+    if segment_distance(point, start, then or start) > _CORRIDOR:
+        return False
+    if then is None or math.dist(start, then) == 0.0:
+        return True
+    # straight from before the turn it would come along its inner side
+    aside, inwards = _beside(point, start, then), _beside(flown[-2], start, then)
+    inner = sum(p * q for p, q in zip(aside, inwards, strict=True))
+    return inner <= _INSIDE * math.hypot(*inwards)
+
+
+def _beside(point: Point, start: Point, end: Point) -> Point:
+    """Vector [m] to a point from the line through two others."""
+    along = [q - p for p, q in zip(start, end, strict=True)]
+    offset = [q - p for p, q in zip(start, point, strict=True)]
+    share = sum(p * q for p, q in zip(along, offset, strict=True)) / math.hypot(*along)**2
+    x, y, z = (q - share * p for p, q in zip(along, offset, strict=True))
+    return x, y, z
 
 
 def _between(a: PositionSample, b: PositionSample, share: float) -> Point:
