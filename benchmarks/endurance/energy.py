@@ -5,9 +5,11 @@ Run: `python benchmarks/endurance/energy.py --flights 500 --seed 1 --json`. Each
 with gusts, a payload and a battery of its own age, which nobody states: stated is the range of the
 new vehicle in calm air. Allocator, solver and the estimate of the bridge are the real ones; the
 vehicle is the point mass of fleet_sim with a power curve of its own, and its battery reads whole
-per cents. Each flight is flown once more by an oracle: the same allocator with the true
-consumption instead of the estimate. The status is 1 where a vehicle lands below half its reserve,
-or less than 95 % of the tasks of the oracle are flown. The last line is one JSON object.
+per cents. With `--charge counted` it counts the charge in mAh, too, and its capacity is set;
+`wrong`: a capacity is set that is 0.7 to 1.4 times the true one; `per_cent`: there is no sensor.
+Each flight is flown once more by an oracle: the same allocator with the true consumption instead
+of the estimate. The status is 1 where a vehicle lands below half its reserve, or less than 95 % of
+the tasks of the oracle are flown. The last line is one JSON object.
 """
 from __future__ import annotations
 
@@ -34,8 +36,8 @@ from uav_task_alloc.allocator.records import (
 )
 from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.gcs.battery_energy import BatteryEnergy
 from uav_task_alloc.mavlink.gcs.energy_estimate import (
-    EnergyEstimate,
     EnergyLimits,
     FlownAmount,
     NominalEnergy,
@@ -51,10 +53,12 @@ from uav_task_alloc.solver.solve import plan
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 STEP, REPORT, ROUNDS = 0.25, 1.0, 60  # [s], [s], rounds of bees in one solve
+CHARGES = ('counted', 'per_cent', 'wrong')
 RESERVE, HEIGHT, TASKS = 0.2, 40.0, 30  # share, [m], in one flight
 PERIOD = 10.0  # [s] between two searches of the allocator
 LIMIT = 7200.0  # [s] after which a flight counts as lost
 STOP, DESCENT = 2.5, 1.5  # [m/s2] of the planned stops, [m/s]
+CAPACITY = 5000.0  # [mAh] of a new battery
 CLIMB_ENERGY = 1.6  # metres of level flight that a climb of one metre costs more
 
 
@@ -69,6 +73,7 @@ class Conditions:
     health: float  # capacity of the battery, as a share of a new one
     sag: float  # by which the current is higher when it is empty, as a share
     tasks: tuple[Task, ...]
+    wrong: float = 1.0  # a capacity that is set wrongly, as a share of the true one
 
     @classmethod
     def random(cls, rng: random.Random) -> Conditions:
@@ -82,7 +87,8 @@ class Conditions:
             rng.uniform(0.0, 0.2), tuple(Task(
                 f't{k}', (rng.uniform(-side, side), rng.uniform(-side, side),
                           HEIGHT + rng.uniform(-20.0, 20.0)),
-                service_time=rng.choice((0.0, 5.0, 20.0))) for k in range(TASKS)))
+                service_time=rng.choice((0.0, 5.0, 20.0))) for k in range(TASKS)),
+            rng.uniform(0.7, 1.4))
 
     def power(self, airspeed: float) -> float:
         """Power over that of level flight at cruise speed in calm air, new and empty."""
@@ -151,16 +157,25 @@ def solve(*world: object, max_iterations: int | None, **how: object) -> Plan:
 
 
 class Flight:
-    """One flight, by the estimate or by the oracle."""
+    """One flight, by the estimate or by the oracle.
 
-    def __init__(self, conditions: Conditions, oracle: bool) -> None:
+    Args:
+        conditions: of the flight.
+        oracle: with the true consumption.
+        charge: one of CHARGES: how the battery is reported.
+    """
+
+    def __init__(self, conditions: Conditions, oracle: bool, charge: str = 'counted') -> None:
         self.conditions, self.now, self.completed = conditions, 0.0, 0
         config = VehicleConfig('uav_1', 1, ORIGIN, (0.0, 0.0, 0.0), climb_rate=2.5,
                                descent_rate=DESCENT, cruise_speed=conditions.speed,
                                wind=conditions.wind)
         self.body = Body(conditions, config)
-        self.estimate = EnergyEstimate(NominalEnergy(conditions.full_range, 0.0,
-                                                     conditions.speed))
+        self.battery = BatteryEnergy(NominalEnergy(conditions.full_range, 0.0, conditions.speed))
+        self.estimate = self.battery.estimate
+        self.capacity = CAPACITY * conditions.health  # [mAh]
+        self.set_to = math.nan if charge == 'per_cent' else self.capacity * (
+            conditions.wrong if charge == 'wrong' else 1.0)  # [mAh]
         self.oracle = Oracle(conditions, self.body) if oracle else None
         self.speed, self.least = conditions.speed, 1.0  # [m/s] over ground; charge
         params = AllocatorParams(route_end='home', battery_reserve=RESERVE,
@@ -208,7 +223,9 @@ class Flight:
         """Read the battery, report to the allocator, and let it plan."""
         body, stated = self.body, self.conditions.full_range
         charge = math.floor(100.0 * body.battery) / 100.0
-        self.estimate.read(charge)
+        used = math.nan if math.isnan(self.set_to) else math.floor(
+            (1.0 - body.battery) * self.capacity)
+        self.battery.read(charge, used, self.set_to, self.now)
         found, world = self.limits(), self.core.world
         world.update_uav(UavReport(
             'uav_1', body.position, (0.0, 0.0, 0.0), velocity=body.velocity,
@@ -236,7 +253,7 @@ class Flight:
             if not stops:
                 return self.now > 30.0
             self.airborne = True
-            self.estimate.took_off()
+            self.battery.took_off()
             self.way = [(0.0, 0.0, HEIGHT)]
         if not self.way and math.isnan(self.serving):
             self.way = self.next_way()
@@ -284,12 +301,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--flights', type=int, default=500)
     parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--first', type=int, default=0, help='number of the first flight')
+    parser.add_argument('--charge', choices=CHARGES, default='counted')
     parser.add_argument('--json', action='store_true', help='the last line only')
     args = parser.parse_args()
     began, left, flown, best = time.process_time(), [], 0, 0
-    for number in range(args.flights):
+    for number in range(args.first, args.first + args.flights):
         conditions = Conditions.random(random.Random(f'{args.seed}/{number}'))
-        flight, oracle = Flight(conditions, False).fly(), Flight(conditions, True).fly()
+        flight = Flight(conditions, False, args.charge).fly()
+        oracle = Flight(conditions, True).fly()
         left.append(flight.body.battery if flight.now < LIMIT else 0.0)
         flown, best = flown + flight.completed, best + oracle.completed
         if not args.json:
@@ -302,7 +322,7 @@ def main() -> int:
     low = sum(share < 0.5 * RESERVE for share in left)
     share = flown / best if best else 0.0
     print(json.dumps({
-        'flights': args.flights, 'seed': args.seed, 'reserve': RESERVE,
+        'flights': args.flights, 'seed': args.seed, 'charge': args.charge, 'reserve': RESERVE,
         'below_half_reserve': low, 'least_charge': round(min(left), 4),
         'median_charge': round(sorted(left)[len(left) // 2], 4), 'tasks': flown,
         'tasks_of_oracle': best, 'share_of_oracle': round(share, 4),

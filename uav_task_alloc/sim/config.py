@@ -36,6 +36,8 @@ class VehicleConfig:
     settling_time: float | None = None  # [s] for which the first position estimate jumps
     batteries: int = 1  # 1 or 2
     second_battery: float = 0.7  # what remains in it, as a share of what remains in the first
+    battery_capacity: float = 5000.0  # [mAh] of each battery, whatever its parameter says
+    current_sensors: int = 2  # number of batteries, the first ones, whose current is measured
     capacity: int | None = None  # items of the mission storage
     floods: bool = True  # PX4 streams its onboard set unasked
     fence_capacity: int | None = None  # points of the fence store; 0: none at all

@@ -30,6 +30,7 @@ class PointMass:
         self.fixed_heading: float | None = None  # [rad] kept whatever the way; None: along it
         self.flown = 0.0  # [m]
         self.battery = config.charge  # [0..1]
+        self.drain = 0.0  # share of the battery in a second, in the last step
         self._wind = None if config.wind is None else WindAtVehicle(
             config.wind, config.system_id)
         self._max_airspeed = (_LEAN_RESERVE * config.cruise_speed
@@ -71,7 +72,8 @@ class PointMass:
         airspeed = _norm((vx - wx, vy - wy, vz))
         drain = (max(airspeed, _HOVER * config.cruise_speed)
                  + _CLIMB * max(0.0, vz)) * dt / config.range
-        self.battery = max(0.0, self.battery - max(drain, dt / config.endurance))
+        self.drain = max(drain, dt / config.endurance) / dt
+        self.battery = max(0.0, self.battery - self.drain * dt)
 
     def fall(self, dt: float, speed: float) -> None:
         """Fall straight down for `dt` [s] at `speed` [m/s], motors off."""

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of a simulated autopilot: those about fences and returns, as PARAM_VALUE sends them.
-"""
+"""Parameters of a simulated autopilot that the bridge reads, as PARAM_VALUE sends them."""
 from __future__ import annotations
 
 import struct
@@ -20,10 +19,12 @@ _DEFAULTS: dict[str, dict[str, tuple[float, int]]] = {
         'OA_TYPE': (0.0, dialect.MAV_PARAM_TYPE_INT8),
         'RTL_ALT': (1500.0, _INT),  # [cm]
         'WPNAV_SPEED': (1500.0, _REAL),  # [cm/s]
+        'BATT_CAPACITY': (5000.0, _INT), 'BATT2_CAPACITY': (5000.0, _INT),  # [mAh]
     },
     'px4': {
         'GF_ACTION': (2.0, _INT), 'RTL_TYPE': (0.0, _INT),
         'RTL_RETURN_ALT': (60.0, _REAL),  # [m]
+        'BAT1_CAPACITY': (5000.0, _REAL), 'BAT2_CAPACITY': (5000.0, _REAL),  # [mAh]
     },
 }
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.sim.batteries import SimBatteries
 from uav_task_alloc.sim.config import FlightMode
 from uav_task_alloc.sim.estimate import Estimate
 from uav_task_alloc.sim.flight import VehicleFlight
@@ -24,13 +25,14 @@ class TelemetryMessages:
     """Builds each message from the state of the flight; None where it is not sent yet."""
 
     def __init__(self, flight: VehicleFlight, estimate: Estimate, autopilot: int,
-                 system_id: int) -> None:
+                 system_id: int, batteries: SimBatteries) -> None:
+        self.batteries = batteries
         self._flight, self._estimate = flight, estimate
         self._autopilot, self._system_id = autopilot, system_id
         self._px4 = autopilot == dialect.MAV_AUTOPILOT_PX4
         self.makers: dict[int, Maker] = {
             number: _listed(make) for number, make in self._single().items()}
-        self.makers[dialect.MAVLINK_MSG_ID_BATTERY_STATUS] = self.batteries
+        self.makers[dialect.MAVLINK_MSG_ID_BATTERY_STATUS] = self.batteries.messages
 
     def _single(self) -> dict[int, Callable[[], Message | None]]:
         estimator = ((dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS, self.estimator_status)
@@ -133,25 +135,8 @@ class TelemetryMessages:
         flight = self._flight
         healthy = _PREARM if flight.armed or not flight.prearm_refusal() else 0
         return dialect.MAVLink_sys_status_message(
-            _PREARM, _PREARM, healthy, 200, self._voltage(0), 1000, self._percent(0),
-            0, 0, 0, 0, 0, 0)
-
-    def _remaining(self, battery: int) -> float:
-        config, first = self._flight.config, self._flight.body.battery
-        return first * config.second_battery if battery else first
-
-    def _percent(self, battery: int) -> int:
-        return math.floor(100.0 * self._remaining(battery))
-
-    def _voltage(self, battery: int) -> int:
-        return round(10500 + 2100 * self._remaining(battery))  # [mV]
-
-    def batteries(self) -> list[Message]:
-        """BATTERY_STATUS of each battery."""
-        return [dialect.MAVLink_battery_status_message(
-            number, dialect.MAV_BATTERY_FUNCTION_ALL, dialect.MAV_BATTERY_TYPE_LIPO, 32767,
-            [self._voltage(number)] + [65535] * 9, 1000, -1, -1, self._percent(number))
-            for number in range(self._flight.config.batteries)]
+            _PREARM, _PREARM, healthy, 200, self.batteries.voltage(0), self.batteries.current(0),
+            self.batteries.percent(0), 0, 0, 0, 0, 0, 0)
 
     def extended_sys_state(self) -> Message:
         flight = self._flight

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.mavlink.transport.codec import Message, with_plan_id
 from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight
 from uav_task_alloc.sim.ardupilot.mission_server import ArduPilotMissionServer
+from uav_task_alloc.sim.batteries import SimBatteries
 from uav_task_alloc.sim.battery_change import BatteryChange
 from uav_task_alloc.sim.commands import ArduPilotCommands, Commands, Px4Commands
 from uav_task_alloc.sim.config import FlightMode, TruthEvent, VehicleConfig
@@ -80,8 +81,9 @@ class Vehicle(Interventions):
         self.mission.attach(self.flight)
         self._add_fence()
         self.estimate = Estimate(self.flight)
+        self._batteries = SimBatteries(self.flight, self.parameters, self._is_ardupilot)
         self._telemetry = TelemetryMessages(self.flight, self.estimate, autopilot.number,
-                                    config.system_id)
+                                    config.system_id, self._batteries)
         makers = self._telemetry.makers
         rates = autopilot.rates
         if not config.floods:
@@ -124,6 +126,7 @@ class Vehicle(Interventions):
         """
         self.flight.reboot(now)
         self.estimate.reboot()
+        self._batteries.reboot()
         self.mission.reboot()
         self._streams.reboot(now)
         self._reported: tuple[int, int] = (self.flight.seq, 0)  # current item, item count

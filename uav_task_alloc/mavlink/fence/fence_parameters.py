@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of a vehicle about fences and returns: read, never set."""
+"""The parameters of a vehicle about fences, returns and batteries: read, never set."""
 from __future__ import annotations
 
 import math
@@ -18,6 +18,7 @@ _RETURNS = {'ardupilot': ('RTL_ALT', 'RTL_ALT_M'), 'px4': ('RTL_RETURN_ALT',)}
 _SPEEDS = ('WPNAV_SPEED', 'WP_SPD')  # of ArduCopter [cm/s]; [m/s]
 _FENCES = {'ardupilot': ('FENCE_ENABLE', 'FENCE_TYPE', 'FENCE_ACTION', 'OA_TYPE'),
            'px4': ('GF_ACTION',)}
+_LEAST_CAPACITY = 10.0  # [mAh] of a capacity that is set: both autopilots count by no lower one
 _RETURN_HEIGHTS = {'ardupilot': 15.0, 'px4': 60.0}  # [m] defaults of the autopilots
 _PLANNERS = (2.0, 3.0)  # OA_TYPE: Dijkstra, and with BendyRuler
 _INTEGERS = {d.MAV_PARAM_TYPE_UINT8, d.MAV_PARAM_TYPE_INT8, d.MAV_PARAM_TYPE_UINT16,
@@ -44,6 +45,7 @@ class FenceParameters:
         self.values: dict[str, float] = {}
         self._speeds = _SPEEDS if profile.family == 'copter' else ()
         self._reads_speeds = False
+        self._capacities: dict[int, str] = {}  # names of those that are read, by battery
         self._fences = True  # those about fences are read too
         self.reset()
 
@@ -61,7 +63,7 @@ class FenceParameters:
             message: of the vehicle, of any type.
         """
         if message.get_type() != 'PARAM_VALUE' or message.param_id not in (
-                *self.names, *self._speeds):
+                *self.names, *self._speeds, *self._capacities.values()):
             return
         value = float(message.param_value)
         if self._profile.name == 'px4' and message.param_type in _INTEGERS:
@@ -81,7 +83,8 @@ class FenceParameters:
         if now < self._due:
             return []
         names = self.names if fences else self._returns
-        names = (*names, *(self._speeds if self._reads_speeds else ()))
+        names = (*names, *(self._speeds if self._reads_speeds else ()),
+                 *self._capacities.values())
         open_names = [name for name in names
                       if name not in self.values and self._asked.get(name, 0) < _TRIES]
         if not open_names:
@@ -111,6 +114,23 @@ class FenceParameters:
         if 'WPNAV_SPEED' in self.values:
             return self.values['WPNAV_SPEED'] * 0.01
         return 0.0 if wanted and self._speeds and not self._no_speed else math.nan
+
+    def capacity(self, battery: int) -> float:
+        """The capacity that is set for a battery [mAh], which is read from now on.
+
+        Args:
+            battery: number of BATTERY_STATUS.
+
+        Returns:
+            NaN where it is not known, or not yet.
+        """
+        if battery not in self._capacities and self._profile.name in _FENCES:
+            number = f'{battery + 1}' if battery or self._profile.name == 'px4' else ''
+            name = 'BAT' if self._profile.name == 'px4' else 'BATT'
+            self._capacities[battery] = f'{name}{number}_CAPACITY'
+            self._due = 0.0
+        value = self.values.get(self._capacities.get(battery, ''), math.nan)
+        return value if _LEAST_CAPACITY < value < math.inf else math.nan
 
     @property
     def enabled(self) -> bool | None:

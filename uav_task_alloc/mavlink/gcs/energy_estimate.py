@@ -35,6 +35,9 @@ _DRIFT = 0.004  # of the terms in one second, as a share, by the root of time
 _MODEL = 0.02  # standard deviation of what the model does not have, as a share of what is used
 _KNOWN = 0.25  # standard deviation of the level drain, as a share, below which it is known
 _LEAST_USED = 0.01  # of the battery, until its drain is known
+_COUNTED = 0.2  # standard deviation of a counted share by what the model does not have
+_COUNT_DRIFT = 0.1  # that of the charge by a count, for 1 % of the battery, as a share
+_COUNT_RISE = 0.03  # least rise of a reading that restarts a counted charge
 _LEAST_TERM = 0.1  # share of the prior level drain below which no sum of terms is believed
 
 _Floats = NDArray[np.float64]
@@ -138,7 +141,9 @@ class EnergyEstimate:
         self._change_all(_NOMINAL)
         self._share: float | None = None  # the last reading
         self._used = 0.0  # of the battery since the take-off
-        self._flown = FlownAmount()  # since the last reading that changed
+        self._flown = FlownAmount()  # since the last reading that changed, or the last count
+        self._unread = FlownAmount()  # since the last reading
+        self.counting = False  # what is used is counted, and the readings correct the charge
 
     @property
     def known(self) -> bool:
@@ -164,23 +169,67 @@ class EnergyEstimate:
 
     def flew(self, amount: FlownAmount) -> None:
         """Add an amount that was flown."""
-        self._flown = self._flown.plus(amount)
+        self._flown, self._unread = self._flown.plus(amount), self._unread.plus(amount)
 
-    def read(self, share: float) -> None:
-        """Process a reading of the battery; one that is unchanged says nothing."""
-        before, self._share = self._share, share
-        if before is None or share > before:
+    @property
+    def charge(self) -> float:
+        """The expected charge now [0..1]."""
+        return self._charge_now()
+
+    def start_counting(self) -> None:
+        """From now on what is used is counted."""
+        self._advance()
+        self.counting = True
+
+    def count(self, share: float, deviation: float) -> None:
+        """Process a share of the battery that was counted as used since the last one.
+
+        Args:
+            share: of the battery, > 0.
+            deviation: standard deviation of its measurement.
+        """
+        row, self._flown = self._flown.row(), FlownAmount()
+        if row[_TIME] > 0.0:
+            self._observe(row, share, math.hypot(deviation, _COUNTED * share))
+            self._used += share
+            self._drift(float(row[_TIME]))
+        self._x[_CHARGE] -= share
+        self._cov[_CHARGE, _CHARGE] += _COUNT_DRIFT**2 * _STEP * share
+
+    def scale(self, factor: float) -> None:
+        """Change all terms by a factor: the capacity by which shares are counted is another."""
+        self._x[_TIME:] *= factor
+        self._cov[_TIME:, :] *= factor
+        self._cov[:, _TIME:] *= factor
+
+    def read(self, share: float, believed: bool = True) -> None:
+        """Process a reading of the battery; one that is unchanged says nothing.
+
+        Args:
+            share: see above.
+            believed: False: the charge is less where it was counted so.
+        """
+        before, self._share, self._unread = self._share, share, FlownAmount()
+        if before is None or share - before > (_COUNT_RISE if self.counting else 0.0):
             self._restart_charge(share)
         elif share < before:
+            self._fall(before - share, believed)
+
+    def _fall(self, drop: float, believed: bool) -> None:
+        """Process a reading that is lower than the one before."""
+        if not self.counting:
             self._advance()
-            drop = before - share
-            # between the end of the old step and its middle: some round, some cut
-            seen = share + 0.75 * min(drop, _STEP)
-            if abs(seen - float(self._x[_CHARGE])) > max(_JUMP, 3.0 * self._charge_deviation()):
-                self._restart_charge(share)
-                return
-            self._used += drop
-            self._observe(np.eye(6)[_CHARGE], seen, _READING + 0.25 * max(0.0, drop - _STEP))
+        share = self._share or 0.0
+        # between the end of the old step and its middle: some round, some cut
+        seen = share + 0.75 * min(drop, _STEP)
+        more = seen - float(self._x[_CHARGE])
+        if more > 0.0 and not believed:
+            return
+        if abs(more) > max(_JUMP, 3.0 * self._charge_deviation()):
+            self._restart_charge(share)
+            return
+        self._used += 0.0 if self.counting else drop
+        self._observe(np.eye(6)[_CHARGE], seen, _READING + 0.25 * max(0.0, drop - _STEP))
 
     def _charge_deviation(self) -> float:
         return math.sqrt(float(self._cov[_CHARGE, _CHARGE]))
@@ -201,9 +250,13 @@ class EnergyEstimate:
         self._x = move @ self._x
         self._cov = move @ self._cov @ move.T
         self._cov[_CHARGE, _CHARGE] += (_MODEL * used) ** 2
+        self._drift(float(row[_TIME]))
+
+    def _drift(self, seconds: float) -> None:
+        """Let the terms change in a time [s] of flight."""
         level, speed = self.nominal.level, self.nominal.cruise
         scale = np.array([level * speed, level, level, level, level])
-        self._cov[_TIME:, _TIME:] += np.diag((_DRIFT * scale) ** 2) * float(row[_TIME])
+        self._cov[_TIME:, _TIME:] += np.diag((_DRIFT * scale) ** 2) * seconds
 
     def _observe(self, row: _Floats, value: float, deviation: float) -> None:
         """Use a measurement of a weighted sum of the state."""
@@ -224,10 +277,15 @@ class EnergyEstimate:
         """
         row = -self._flown.plus(amount).row()
         row[_CHARGE] = 1.0
-        share = 1.0 if self._share is None else self._share
-        charge = min(max(float(self._x[_CHARGE] - self._flown.row() @ self._x), share),
-                     share + _STEP) - float(amount.row() @ self._x)
+        charge = self._charge_now() - float(amount.row() @ self._x)
         return charge - deviations * math.sqrt(max(0.0, float(row @ self._cov @ row)))
+
+    def _charge_now(self) -> float:
+        """The expected charge: within the step of the last reading, less what was flown since."""
+        share = 1.0 if self._share is None else self._share
+        since = float(self._unread.row() @ self._x)
+        charge = float(self._x[_CHARGE] - self._flown.row() @ self._x) + since
+        return min(charge if self.counting else max(charge, share), share + _STEP) - since
 
     def limits(self, ahead: FlownAmount, speed: float, deviations: float,
                landing: float = 0.0) -> EnergyLimits:

@@ -95,6 +95,7 @@ class MissionExecutor:
         self.fence = VehicleFence(peer, profile, origin, self.telemetry, self.onboard,
                                  self.authority, lambda: self.policy, rng,
                                  fence_memory or FenceMemory())
+        self.energy.read_capacity = self.fence.parameters.capacity
         takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
                           lambda: self.policy, self.fence.missing)
         self._end_of_list = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
@@ -246,8 +247,6 @@ class MissionExecutor:
                       self.fence.notes):
             self.notes += notes
             notes.clear()
-
-    # Received messages
 
     def _update_progress(self, message: Message, newest: bool, now: float) -> None:
         kind, progress, own = message.get_type(), self.onboard.progress, self.onboard.own

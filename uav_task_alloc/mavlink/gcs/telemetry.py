@@ -44,7 +44,7 @@ WANTED = frozenset({*RATES, *ESTIMATE.values(), *(
     getattr(d, 'MAVLINK_MSG_ID_' + name) for name in (
     'HEARTBEAT', 'MISSION_REQUEST', 'MISSION_REQUEST_INT', 'MISSION_ACK', 'MISSION_COUNT',
     'MISSION_ITEM', 'MISSION_ITEM_INT', 'MISSION_ITEM_REACHED', 'COMMAND_ACK', 'STATUSTEXT',
-    'SYSTEM_TIME', 'PARAM_VALUE'))})
+    'SYSTEM_TIME', 'PARAM_VALUE', 'SMART_BATTERY_INFO'))})
 UNKNOWN: Point = (math.nan, math.nan, math.nan)
 
 

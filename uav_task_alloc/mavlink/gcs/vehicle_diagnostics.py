@@ -42,6 +42,7 @@ class VehicleFacts:
     fence_left_out: str  # zones that it does not hold, and why
     rally_points: str  # state of those on board
     failsafe_way: str  # what a straight way home crosses now
+    batteries: str  # what is left in each, and how it is known
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ def _level_of(session: VehicleSession, now: float) -> tuple[int, str]:
         return _ERROR, executor.alarm
     if authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED):
         return _WARN, f'authority {authority.state.name}: {authority.why}'
-    warning = executor.fence.warning
+    warning = '; '.join(filter(None, (executor.fence.warning, executor.energy.warning)))
     if state is MissionState.FOREIGN:
         return _WARN, f'mission {state.name}' + (f', {warning}' if warning else '')
     return (_WARN, warning) if warning else (_OK, f'mission {state.name}')
@@ -118,7 +119,7 @@ def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
         fence=executor.fence.text, fence_parameters=executor.fence.parameters.text,
         fence_left_out=executor.fence.left_out or 'nothing',
         rally_points=executor.fence.rally_text,
-        failsafe_way=executor.fence.way_home or 'nothing')
+        failsafe_way=executor.fence.way_home or 'nothing', batteries=executor.energy.text)
 
 
 def upload_progress(onboard: OnboardMission, now: float) -> str:
