@@ -47,6 +47,11 @@ class SimParameters:
         """The value of a parameter; 0 where the vehicle does not have it."""
         return self.values.get(name, 0.0)
 
+    @property
+    def return_height(self) -> float:
+        """The height above home to which it returns, unless it is higher [m]."""
+        return self.values.get('RTL_RETURN_ALT', 0.01 * self.values.get('RTL_ALT', 0.0))
+
     def receive(self, message: Message) -> list[Message]:
         """Answer PARAM_REQUEST_READ and PARAM_SET; the answer to an unknown name is none."""
         name = message.param_id

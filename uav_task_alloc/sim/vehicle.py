@@ -96,7 +96,7 @@ class Vehicle(Interventions):
         self._handlers: dict[str, Callable[[Message], list[Message]]] = {
             'COMMAND_LONG': self._command_long, 'COMMAND_INT': self._command_int,
             'SET_MODE': self._set_mode, 'MISSION_SET_CURRENT': self._set_current,
-            'PARAM_REQUEST_READ': self.parameters.receive, 'PARAM_SET': self.parameters.receive,
+            'PARAM_REQUEST_READ': self.parameters.receive, 'PARAM_SET': self._set_parameter,
         }
         self.reboot(now)
         self.flight.events.clear()
@@ -106,6 +106,7 @@ class Vehicle(Interventions):
         config, name = self.config, self.autopilot.name
         speed = (('WPNAV_SPEED', 100.0 * config.cruise_speed),) if self._is_ardupilot else ()
         self.parameters = SimParameters(name, (*speed, *config.parameters))
+        self.flight.return_height = self.parameters.return_height
         for mission_type, capacity in CAPACITIES[name].items():
             if config.fence_capacity is not None:
                 capacity = min(capacity, config.fence_capacity)
@@ -246,6 +247,11 @@ class Vehicle(Interventions):
         self.flight.note('command', command='mode', mode=m.custom_mode, cause=_station(m))
         self.flight.set_custom_mode(m.custom_mode)
         return []
+
+    def _set_parameter(self, m: Message) -> list[Message]:
+        out = self.parameters.receive(m)
+        self.flight.return_height = self.parameters.return_height
+        return out
 
     def _set_current(self, m: Message) -> list[Message]:
         if m.target_component not in (AUTOPILOT_COMPONENT, 0):

@@ -55,6 +55,7 @@ class FenceParameters:
         self._asked: dict[str, int] = {}  # requests without an answer, by name
         self._due = 0.0
         self._no_speed = False  # it has not answered
+        self._no_answer = False  # all was requested often enough
 
     def receive(self, message: Message) -> None:
         """Take a PARAM_VALUE of the vehicle, whoever requested or set it.
@@ -89,7 +90,7 @@ class FenceParameters:
                       if name not in self.values and self._asked.get(name, 0) < _TRIES]
         if not open_names:
             self._due = now + _REFRESH
-            self._no_speed = self._reads_speeds
+            self._no_speed, self._no_answer = self._reads_speeds, True
             self._asked = {}
             open_names = [name for name in names if name in self.values]
         else:
@@ -157,6 +158,12 @@ class FenceParameters:
         if 'RTL_ALT' in self.values:
             return self.values['RTL_ALT'] * 0.01
         return self.values.get('RTL_RETURN_ALT', _RETURN_HEIGHTS.get(self._profile.name, 0.0))
+
+    def known_return_height(self) -> float:
+        """`return_height`, NaN while it is being read."""
+        known = self._no_answer or not self._returns or any(
+            name in self.values for name in self._returns)
+        return self.return_height if known else math.nan
 
     @property
     def text(self) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from uav_task_alloc.geometry.zones_on_path import zone_across_path
 from uav_task_alloc.mavlink.autopilots import ModeFunction
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
@@ -106,5 +105,5 @@ class EndOfList:
         telemetry, zones = self._telemetry, self._policy().zones
         if telemetry.home is None or not telemetry.has_position:
             return 'its path home is not known' if zones else ''
-        zone = zone_across_path(telemetry.position, telemetry.home, zones)
+        zone = self._onboard.list.way_home.zone_on_return(telemetry.position, telemetry.home)
         return f'zone {zone.id} is across its path home' if zone else ''

@@ -83,17 +83,31 @@ class VehicleFence:
             RALLY_BUDGET, memory.own, lambda own: self._save('rally', own, memory), rally_alike))
         self.parameters = FenceParameters(peer, profile)
         onboard.list.read_speed = self.parameters.cruise_speed
+        way_home = onboard.list.way_home
+        way_home.zones = lambda: () if self._flies_around else self._policy().zones
+        way_home.return_height = self.parameters.known_return_height
         self.notes: deque[OperatorNote] = deque()
         self.fence = Fence()
         self._chosen_for: object = None
         self._choose_at = self._changed_at = -1e9  # [s]
         self._reported = ''
+        self._was_verified = False
         self._blocks_for: tuple[FlightSpace, tuple[tuple[Item, ...], ...]] | None = None
         self._is_blocked = False  # the answer of `_blocks` for that
 
     def _save(self, store: str, own: frozenset[ItemKey], memory: FenceMemory) -> None:
         self._own[store] = own
         memory.save(frozenset().union(*self._own.values()))
+
+    @property
+    def _flies_around(self) -> bool:
+        """Whether the vehicle itself flies around all zones; not for a moment, by a readback."""
+        if self.verified:
+            self._was_verified = True
+        elif self.state not in (FenceState.UNKNOWN, FenceState.UPLOADING):
+            self._was_verified = False
+        return (self._was_verified and self.active and self.parameters.plans_around
+                and not self.left_out)
 
     @property
     def active(self) -> bool:
@@ -112,6 +126,7 @@ class VehicleFence:
 
     def restart(self) -> None:
         """Start over after a restart of the vehicle."""
+        self._was_verified = False
         self.transfer.reset()
         self.rally.transfer.reset()
         self.parameters.reset()
@@ -238,6 +253,8 @@ class VehicleFence:
             parts.append(f'fence {self.parameters.text}')
         if self.active and (self.fence.no_space or self.fence.waiting):
             parts.append(f'fence without {self.left_out}')
+        if blocked := self._onboard.list.way_home.blocked:
+            parts.append(blocked)
         if self.way_home:
             parts.append(f"a failsafe's straight way home crosses {self.way_home}")
         return '; '.join(parts)
@@ -294,7 +311,8 @@ class VehicleFence:
         return (policy.zones, policy.fence_area, policy.cruise_altitude, telemetry.home,
                 telemetry.airborne, onboard.tasks, len(onboard.progress.completed),
                 onboard.progress.items, onboard.progress.current, self.transfer.budget,
-                self.parameters.return_height, self.verified)
+                self.parameters.return_height, self.parameters.plans_around, self._returns,
+                self.verified)
 
     def _space(self) -> FlightSpace:
         """Where the vehicle flies: its list, the mission on board, home, and the heights."""
@@ -307,10 +325,16 @@ class VehicleFence:
                  if item.position is not None] if telemetry.airborne else []
         rise = home[2] + max(policy.cruise_altitude, self.parameters.return_height)
         heights = [p[2] for p in (*planned, *flown)] or [rise]
-        ends = (home,) if self._onboard.tasks is not None and self._onboard.tasks.returns else ()
+        # a vehicle that flies around its fence does not return straight
+        ends = (home,) if self._returns and not self.parameters.plans_around else ()
         return FlightSpace(
             ((start, *planned, *ends), (start, *flown), (home,)), min(heights),
             max(*heights, rise), telemetry.position if telemetry.airborne else None)
+
+    @property
+    def _returns(self) -> bool:
+        """Whether its list ends with a return."""
+        return self._onboard.tasks is not None and self._onboard.remaining().returns
 
     def _planned(self) -> list[Point]:
         """The points of the list that are still to be flown."""

@@ -28,6 +28,7 @@ from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.mavlink.mission.waits import Waits
 from uav_task_alloc.mavlink.mission.way_approach import approach
+from uav_task_alloc.mavlink.mission.way_home import WayHome
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Point, Task, ThreatZone
 
@@ -74,6 +75,7 @@ class WantedMission:
         self.read_speed: Callable[[bool], float] = lambda wanted: math.nan
         self.stored_pieces: tuple[PieceMark, ...] = ()  # of the previous run of the bridge
         self.zones: Callable[[], tuple[ThreatZone, ...]] = tuple  # in force
+        self.way_home = WayHome(profile.rules.lands, home)
         self._changes_speed = False  # an action of the list does
         self._airborne, self._home = airborne, home
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
@@ -86,6 +88,8 @@ class WantedMission:
     def assign(self, tasks: TaskList) -> None:
         """Take the latest list; a refused task is tried again where it has changed."""
         first, self.tasks = self.tasks is None, tasks
+        start = self.leg.locate()
+        self.way_home.begin(None if start is None else start.point)
         self.waits.assign(tasks, self._progress.completed, self._airborne(),
                           self._progress.active)
         self.horizon.reset()
@@ -155,11 +159,14 @@ class WantedMission:
         assert self.tasks is not None
         ended = tuple(self._progress.completed), self._progress.pending, tuple(self._refused)
         coverage = self._progress.coverage
-        key = self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest
+        way_home = self.way_home.key
+        key = self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest, way_home
         if self._remaining is None or self._remaining[0] != key:
             tasks = self.tasks.without(chain.from_iterable(ended))
             tasks = replace(tasks, stops=self._rests(tasks.stops))
-            key = self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest
+            tasks = self.way_home.of(tasks)
+            key = (self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest,
+                   way_home)
             self._remaining = key, (
                 tasks if self.horizon.stops is None else tasks.first(self.horizon.stops))
         return self._remaining[1]
@@ -189,9 +196,10 @@ class WantedMission:
     def items(self) -> tuple[Item, ...]:
         """The items to fly from here; a task that cannot be an item is refused."""
         self.waits.note_active(self.remaining(), self._progress.active)
-        coverage = self._progress.coverage
-        state = (self.tasks, self.waits.version, len(self._progress.completed),
-                 self._progress.pending, len(self._refused), self.horizon.stops,
+        coverage, ends = self._progress.coverage, self.remaining()
+        state = (self.tasks, ends.returns, ends.end_via, self.waits.version,
+                 len(self._progress.completed), self._progress.pending, len(self._refused),
+                 self.horizon.stops,
                  coverage.version, coverage.latest, self.cruise())
         if self._leg_key != state or self.leg.is_off:
             self.leg.begin(self.remaining())
