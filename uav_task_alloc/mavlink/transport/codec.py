@@ -8,6 +8,14 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from uav_task_alloc.mavlink.transport.plain_frames import (
+    CHECKSUM,
+    HEADER,
+    V2,
+    decode_plain,
+    pack_plain,
+)
+
 MAX_SKIPPED = 512  # skipped frames kept until the next decoded message
 Message = Any  # a dialect.MAVLink_message; the dialect has no usable types
 Signing = Any  # a dialect.MAVLinkSigning; shared by all parsers, which detects replays
@@ -18,6 +26,7 @@ _PLAN_ID_AT = {
     dialect.MAVLINK_MSG_ID_MISSION_ACK: 4,
     dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 6,
 }
+_UNWANTED = dialect.MAVLink_unknown(0, bytearray())  # stands for each; never returned by `parse`
 _RADIO_STATUS = dialect.MAVLINK_MSG_ID_RADIO_STATUS  # sent by the modem, which has no key
 
 
@@ -28,6 +37,21 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
     skipped: list[tuple[int, int]]  # system id and sequence number of unwanted frames
     tap: Callable[[bytes], None] | None = None
 
+    def parse_frames(self, data: bytes) -> list[Message]:
+        """As `parse_buffer`; a single complete frame, as most data are, needs no buffer."""
+        if (len(data) < HEADER + CHECKSUM or data[0] != V2 or data[2] or self.buf
+                or len(data) != HEADER + data[1] + CHECKSUM):
+            return self.parse_buffer(data) or []
+        self.total_bytes_received += len(data)
+        self.have_prefix_error, self.expected_length = False, HEADER + CHECKSUM
+        try:
+            message = self.decode(bytearray(data))
+        except dialect.MAVError as reason:
+            message = dialect.MAVLink_bad_data(bytearray(data), reason.message)
+            self.total_receive_errors += 1
+        self.total_packets_received += 1
+        return [message]
+
     def decode(self, msgbuf: bytearray) -> Message:
         if self.tap is not None:
             self.tap(bytes(msgbuf))
@@ -37,8 +61,9 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
             if number not in self.wanted:
                 at = 4 if msgbuf[0] == 253 else 2  # sequence number, followed by system id
                 self.skipped.append((msgbuf[at + 1], msgbuf[at]))
-                return dialect.MAVLink_unknown(number, msgbuf)
-        return super().decode(msgbuf)
+                return _UNWANTED
+        plain = msgbuf[0] == V2 and not msgbuf[2] and self.signing.secret_key is None
+        return (decode_plain(msgbuf) if plain else None) or super().decode(msgbuf)
 
     def check_signature(self, msgbuf: bytearray, system: int, component: int) -> bool:
         # The dialect stores the timestamp before it checks the signature: a forged frame would
@@ -85,7 +110,7 @@ class Codec:
         """Encode a message; `with_plan_id` adds the mission id that the dialect lacks."""
         plan_id = getattr(message, 'plan_id', None)
         if plan_id is None:
-            frame = message.pack(self._mav)
+            frame = pack_plain(message, self._mav) or message.pack(self._mav)
         else:
             fields = [getattr(message, name) for name in message.ordered_fieldnames]
             payload = message.unpacker.pack(*fields) + struct.pack('<I', plan_id)
@@ -95,7 +120,7 @@ class Codec:
 
     def parse(self, data: bytes) -> list[Message]:
         """Decode the complete frames so far; an incomplete frame is kept for the next call."""
-        messages = [m for m in self._mav.parse_buffer(data) or () if m.get_msgId() >= 0]
+        messages = [m for m in self._mav.parse_frames(data) if m.get_msgId() >= 0]
         if messages and self._mav.skipped:
             messages[0].skipped = tuple(self._mav.skipped)
             self._mav.skipped.clear()
