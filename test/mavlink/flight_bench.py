@@ -8,6 +8,7 @@ from mission_bench import ORIGIN, OURS, Line, make_vehicle, task_list
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.status import state_of
+from uav_task_alloc.mavlink.gcs.telemetry import WANTED
 from uav_task_alloc.mavlink.transport.codec import Codec
 
 
@@ -33,7 +34,7 @@ class FlightBench:
                              random.Random(self.seed), self.store)
         for n in self.vehicles:
             self.codecs['up', n] = Codec(*OURS)
-            self.decoders['down', n] = Codec(*OURS)
+            self.decoders['down', n] = Codec(*OURS, wanted=WANTED)  # as the node does
         for n in self.vehicles:
             self.decoders['up', n] = Codec(n, 1)
         self.events, self.notes = [], []
