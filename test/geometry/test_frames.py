@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """WGS84 to ENU and back, also over the earth's curvature."""
+import random
+
 import numpy as np
+import pymap3d
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
@@ -43,3 +46,15 @@ def test_no_points_give_no_rows():
 def test_a_latitude_beyond_the_pole_is_refused():
     with pytest.raises(InvalidValue, match=r'origin latitude = 91.0: expected a number in \[-90'):
         Origin(91.0, 0.0)
+
+
+def test_one_position_is_converted_bit_by_bit_as_by_pymap3d():
+    rng = random.Random(5)
+    for _ in range(20):
+        origin = Origin(rng.uniform(-90.0, 90.0), rng.uniform(-180.0, 180.0),
+                        rng.uniform(-100.0, 4000.0))
+        for reach in (1e-4, 0.1, 20.0):
+            place = (max(-90.0, min(90.0, origin.latitude + rng.uniform(-reach, reach))),
+                     origin.longitude + rng.uniform(-reach, reach), rng.uniform(-100.0, 9000.0))
+            assert to_enu(origin, *place) == pymap3d.geodetic2enu(
+                *place, origin.latitude, origin.longitude, origin.altitude_amsl)

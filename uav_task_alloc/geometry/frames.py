@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pymap3d
@@ -10,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from uav_task_alloc.checks import check_number
 from uav_task_alloc.model import Point
+
+_WGS84 = pymap3d.Ellipsoid.from_name('wgs84')
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +39,9 @@ class Origin:
 
 
 def to_enu(origin: Origin, latitude: float, longitude: float, altitude_amsl: float) -> Point:
-    """Convert a geodetic position to ENU, as `to_enu_batch`; three times as fast for one.
+    """Convert a geodetic position to ENU, as `to_enu_batch`; many times as fast for one.
+
+    The equations of `pymap3d.geodetic2enu` in the same order, so that each bit is the same.
 
     Args:
         origin: of the ENU frame.
@@ -47,10 +52,28 @@ def to_enu(origin: Origin, latitude: float, longitude: float, altitude_amsl: flo
     Returns:
         (east, north, up) [m].
     """
-    x, y, z = pymap3d.geodetic2enu(
-        float(latitude), float(longitude), float(altitude_amsl),
-        origin.latitude, origin.longitude, origin.altitude_amsl)
-    return float(x), float(y), float(z)
+    (x, y, z), *_ = _ecef(float(latitude), float(longitude), float(altitude_amsl))
+    (x0, y0, z0), cos_lat, sin_lat, cos_lon, sin_lon = _ecef_of(origin)
+    u, v, w = x - x0, y - y0, z - z0
+    t = cos_lon * u + sin_lon * v
+    return (-sin_lon * u + cos_lon * v, -sin_lat * t + cos_lat * w, cos_lat * t + sin_lat * w)
+
+
+def _ecef(latitude: float, longitude: float, altitude: float,
+          ) -> tuple[Point, float, float, float, float]:
+    """ECEF [m], and cosine and sine of latitude and longitude, as `pymap3d.geodetic2ecef`."""
+    lat, lon = np.radians(latitude), np.radians(longitude)
+    cos_lat, sin_lat = float(np.cos(lat)), float(np.sin(lat))
+    cos_lon, sin_lon = float(np.cos(lon)), float(np.sin(lon))
+    a, b = _WGS84.semimajor_axis, _WGS84.semiminor_axis
+    n = a**2 / float(np.hypot(a * cos_lat, b * sin_lat))  # radius of the prime vertical [m]
+    return ((n + altitude) * cos_lat * cos_lon, (n + altitude) * cos_lat * sin_lon,
+            (n * (b / a) ** 2 + altitude) * sin_lat), cos_lat, sin_lat, cos_lon, sin_lon
+
+
+@lru_cache(maxsize=16)
+def _ecef_of(origin: Origin) -> tuple[Point, float, float, float, float]:
+    return _ecef(origin.latitude, origin.longitude, origin.altitude_amsl)
 
 
 def to_geodetic(origin: Origin, point: Point) -> tuple[float, float, float]:

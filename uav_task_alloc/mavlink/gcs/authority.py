@@ -263,7 +263,8 @@ class Authority:
         if self.undecided or (
                 self.suspensions and set(self.suspensions) == {Suspension.FOREIGN}):
             return action is SendAction.READ  # else the end of FOREIGN would not be detected
-        return self.state in PERMISSIONS and action in PERMISSIONS[self.state][1]
+        allowed = PERMISSIONS.get(self.state)
+        return allowed is not None and action in allowed[1]
 
     @property
     def held(self) -> bool:
@@ -272,7 +273,7 @@ class Authority:
 
     def suspended_by(self, suspension: Suspension) -> bool:
         """Whether this cause suspends it now, alone or with others."""
-        return suspension in self.suspensions
+        return bool(self.suspensions) and suspension in self.suspensions
 
     def apply(self, event: AuthorityEvent, now: float, why: str = '') -> bool:
         """Make the transition of `AUTHORITY_TABLE` for an event.

@@ -216,9 +216,12 @@ class GroundStation:
         yet: their flown tasks become known in a moment, and are then not flown by others.
         """
         executors = [session.executor for session in self.sessions.values()]
-        reading = self._read_until is not None and now < self._read_until
-        unread = [executor for executor in executors if reading
-                  and not executor.onboard.resume.located and not executor.telemetry.stale(now)]
+        if self._read_until is None or now >= self._read_until:
+            for executor in executors:
+                executor.onboard.list.perhaps_flown = frozenset()
+            return
+        unread = [executor for executor in executors
+                  if not executor.onboard.resume.located and not executor.telemetry.stale(now)]
         for executor in executors:
             executor.onboard.list.perhaps_flown = frozenset(
                 task for other in unread if other is not executor

@@ -20,6 +20,7 @@ class MessageRates:
     def __init__(self, peer: Peer, telemetry: Telemetry, now: float) -> None:
         self._peer, self._telemetry = peer, telemetry
         self._silent: set[int] = set()  # received once, and missing now
+        self._rates: dict[int | None, dict[int, float]] = {None: RATES}  # by estimator report
         self.restart(now)
 
     def restart(self, now: float) -> None:
@@ -34,7 +35,10 @@ class MessageRates:
             self.restart(now)
         self._received = self._received or not quiet
         estimate = ESTIMATE.get(self._telemetry.autopilot)
-        rates = {**RATES, estimate: 1.0} if estimate is not None else RATES
+        rates = self._rates.get(estimate)
+        if rates is None and estimate is not None:
+            rates = self._rates[estimate] = {**RATES, estimate: 1.0}
+        assert rates is not None
         last = self._telemetry.received_last
         silent = {number for number, rate in rates.items()
                   if now - last.get(number, now) > _SILENT + 4.0 / rate}

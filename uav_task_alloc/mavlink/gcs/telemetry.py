@@ -171,8 +171,9 @@ class Telemetry:
         if now - self.received_at > _QUIET:
             self._gap_at = now
         self.received_at = now
-        self.frames.note_all((seq for system, seq in getattr(message, 'skipped', ())
-                              if system == message.get_srcSystem()), now)
+        if skipped := getattr(message, 'skipped', ()):
+            self.frames.note_all((seq for system, seq in skipped
+                                  if system == message.get_srcSystem()), now)
         self.frame = self.frames.note(message.get_seq(), now)
         self.received_ids.add(message.get_msgId())
         self.received_last[message.get_msgId()] = now

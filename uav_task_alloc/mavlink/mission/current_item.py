@@ -95,8 +95,11 @@ class CurrentItem:
 
     def current_since(self, item: Item) -> float:
         """Vehicle time [s] from which an item is flown that is current, or was just passed."""
+        latest = max(self._epoch.since, self._entered_at)
+        if not self.passed.claims:
+            return latest
         return next((claim.since for claim in self.passed.claims if any(
-            item is one for one in claim.items)), max(self._epoch.since, self._entered_at))
+            item is one for one in claim.items)), latest)
 
     def was_jumped_over(self, seq: int) -> bool:
         """Whether another station may have set the current item past an item."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from enum import Enum
 from itertools import pairwise
 from typing import NamedTuple
@@ -19,6 +19,10 @@ CLOSE = 0.5  # [m] tolerance beyond the acceptance radius
 _HOLD_SPEED = 0.4  # [m/s] below it a vehicle holds its position
 _CURVE = 0.4  # [m/s2] error bound of the interpolation between two samples
 _PIECES = 8  # interpolated points between two samples
+_SHARES = tuple(k / _PIECES for k in range(_PIECES + 1))
+# of a cubic Hermite interpolation: share, and weights of both positions and of both velocities
+_HERMITE = tuple((s, 2 * s**3 - 3 * s**2 + 1, s**3 - 2 * s**2 + s, 3 * s**2 - 2 * s**3,
+                  s**3 - s**2) for s in _SHARES)
 _JUMP = 30.0  # [m] beyond the distance its speed explains: the estimate jumped
 _FEW, _USUAL_SPEED = 100, 15.0  # samples; [m/s] assumed where there are fewer
 _ACCELERATION = 6.0  # [m/s2] that no vehicle exceeds for seconds (PX4: MPC_ACC_HOR_MAX 5)
@@ -209,9 +213,9 @@ class FlownPath:
             if gap > GAP or b.t < since or min(from_a, from_b) > near + 5.0 + 30.0 * gap:
                 continue
             reach = near + _CURVE * gap * gap
-            for k in range(_PIECES + 1):
-                t, share = a.t + gap * k / _PIECES, k / _PIECES
-                if since <= t <= until and math.dist(_between(a, b, share), point) <= reach:
+            for k, (share, place) in enumerate(zip(_SHARES, _between(a, b), strict=True)):
+                t = a.t + gap * k / _PIECES
+                if since <= t <= until and math.dist(place, point) <= reach:
                     first = min(first, t)
                     if not slow or math.dist(a.velocity, (0, 0, 0)) * (1 - share) + share * (
                             math.dist(b.velocity, (0, 0, 0))) < _HOLD_SPEED:
@@ -254,14 +258,18 @@ def _beside(point: Point, start: Point, end: Point) -> Point:
     return x, y, z
 
 
-def _between(a: PositionSample, b: PositionSample, share: float) -> Point:
-    """Cubic Hermite interpolation between two samples; linear where a velocity is unknown."""
-    h, s = b.t - a.t, share
-    if any(math.isnan(v) for v in (*a.velocity, *b.velocity)):
-        x, y, z = point_at(a.position, b.position, s)
-        return x, y, z
-    k = (2 * s**3 - 3 * s**2 + 1, h * (s**3 - 2 * s**2 + s), 3 * s**2 - 2 * s**3,
-         h * (s**3 - s**2))
-    x, y, z = (k[0] * p + k[1] * u + k[2] * q + k[3] * w for p, u, q, w in zip(
-        a.position, a.velocity, b.position, b.velocity, strict=True))
-    return x, y, z
+def _between(a: PositionSample, b: PositionSample) -> Iterator[Point]:
+    """The points at _SHARES of the way between two samples; linear where a velocity is unknown."""
+    (px, py, pz), (ux, uy, uz) = a.position, a.velocity
+    (qx, qy, qz), (wx, wy, wz) = b.position, b.velocity
+    if math.isnan(ux + uy + uz + wx + wy + wz):
+        for share in _SHARES:
+            x, y, z = point_at(a.position, b.position, share)
+            yield x, y, z
+        return
+    h = b.t - a.t
+    for _, from_a, by_a, from_b, by_b in _HERMITE:
+        by_a, by_b = h * by_a, h * by_b
+        yield (from_a * px + by_a * ux + from_b * qx + by_b * wx,
+               from_a * py + by_a * uy + from_b * qy + by_b * wy,
+               from_a * pz + by_a * uz + from_b * qz + by_b * wz)

@@ -58,30 +58,26 @@ class PassedItems:
 
     def __init__(self, frames: FrameLog, positions: PositionHistory) -> None:
         self._frames, self._positions = frames, positions
-        self._claims: list[Claim] = []
-
-    @property
-    def claims(self) -> tuple[Claim, ...]:
-        """Those that are open, in order."""
-        return tuple(self._claims)
+        self.claims: tuple[Claim, ...] = ()  # those that are open, in order
 
     def add(self, claim: Claim) -> None:
         """Add a claim, to be judged."""
-        self._claims.append(claim)
+        self.claims = (*self.claims, claim)
 
     def note_reached(self, item: Item) -> None:
         """Note a REACHED that may be of an item: the lack of one proves nothing any more."""
-        self._claims = [replace(claim, frames=None) if any(item is one for one in claim.items)
-                        else claim for claim in self._claims]
+        self.claims = tuple(
+            replace(claim, frames=None) if any(item is one for one in claim.items) else claim
+            for claim in self.claims)
 
     def seen(self) -> tuple[Item, ...]:
         """Items of open claims at which the vehicle was seen, where nothing more will come."""
-        return tuple(item for claim in self._claims for item in claim.items
+        return tuple(item for claim in self.claims for item in claim.items
                      if self._visit(item, claim) is Visit.YES or self._approached(item, claim))
 
     def clear(self) -> None:
         """Drop all claims: the mission on board is unknown."""
-        self._claims.clear()
+        self.claims = ()
 
     def judge(self, claim: Claim, items: tuple[Item, ...], now: float,
               left_unseen: bool = False) -> _Judged:
@@ -112,7 +108,7 @@ class PassedItems:
         return _Judged(seen + unseen, tuple(i for i in rest if i not in unseen))
 
     def _drop(self, claim: Claim) -> None:
-        self._claims = [each for each in self._claims if each is not claim]
+        self.claims = tuple(each for each in self.claims if each is not claim)
 
     def _unobserved(self, rest: tuple[Item, ...], visits: dict[str, Visit],
                     claim: Claim, left_unseen: bool) -> tuple[Item, ...]:

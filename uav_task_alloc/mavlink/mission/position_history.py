@@ -121,6 +121,9 @@ class PositionHistory:
         Called for the same item again, only the positions since then are searched.
         """
         known, until, late, inside = self._inside
+        if known is not None and known[0] is item and known[1] == since and (
+                until == self.path.newest):
+            return inside  # as at the messages since the newest position
         if known != (item, since):
             until, late, inside = since, self.path.late, False
         if not inside and self.path.newest > until and item.position is not None:

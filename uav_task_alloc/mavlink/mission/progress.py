@@ -164,8 +164,9 @@ class ProgressTable:
         0: no, 1: yes, 2: perhaps, as nothing has shown the mode since.
         """
         moves = self._moves
-        claims = [claim for claim in moves.passed.claims
-                  if claim.in_flight or moves.left_unseen_since(claim)]
+        claims = moves.passed.claims and [
+            claim for claim in moves.passed.claims
+            if claim.in_flight or moves.left_unseen_since(claim)]
         if not claims:
             return _NONE, 0
         left = 1 if any(map(moves.left_unseen_since, claims)) else 2 * moves.may_have_left
@@ -253,10 +254,9 @@ class ProgressTable:
 
     def has_arrived(self, seq: int) -> bool:
         """Whether the vehicle was within the radius of an item since it is current."""
-        if seq >= len(self.items):
-            return False
-        since = self._moves.current_since(self.items[seq])
-        return self.positions.was_inside(self.items[seq], since)
+        items = self._epoch.items
+        return seq < len(items) and self.positions.was_inside(
+            items[seq], self._moves.current_since(items[seq]))
 
     def begin_set_current(self, seq: int) -> None:
         """Note that we are about to set the current item; it may be reported before the ack."""
