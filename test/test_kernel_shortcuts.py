@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shortcuts through numba's compiler: in place while a kernel is compiled, with equal results."""
+import io
 import operator
 import os
 import subprocess
 import sys
+from functools import reduce
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from llvmlite import ir as llvm
+from llvmlite.ir._utils import DuplicatedNameError, NameScope
 from numba import types
-from numba.core import compiler, ir
+from numba.core import compiler, event, ir
+from numba.core.postproc import PostProcessor
+from numba.core.registry import cpu_target
 from numba.core.targetconfig import ConfigStack
 
 from uav_task_alloc import kernel_shortcuts
@@ -25,8 +31,8 @@ def methods():
     """The methods that shortcuts replace, as they are now."""
     found = []
     for shortcut in SHORTCUTS:
-        owner, name = shortcut.path.split('.')
-        kind = getattr(import_module(f'numba.core.{shortcut.module}'), owner)
+        *owner, name = shortcut.path.split('.')
+        kind = reduce(getattr, owner, import_module(shortcut.module))
         found.append((name in vars(kind), getattr(kind, name)))  # its own or inherited
     return found
 
@@ -95,10 +101,90 @@ def test_a_call_with_known_types_is_resolved_once_for_each_kind_of_kernel():
     assert len(resolved) == 6
 
 
+def test_sizes_and_hashes_of_types_are_the_same_and_computed_once(monkeypatch):
+    context, asked = cpu_target.target_context, []
+    pair = llvm.LiteralStructType([llvm.IntType(8), llvm.DoubleType()])
+    named = llvm.global_context.get_identified_type('pair')
+    named.set_body(llvm.IntType(64))
+    tuple_type = types.Tuple((types.int64, types.Array(types.float64, 2, 'C')))
+    plain = [context.get_abi_sizeof(each) for each in (pair, named)], hash(tuple_type)
+    size = llvm.Type.get_abi_size
+    monkeypatch.setattr(llvm.Type, 'get_abi_size', lambda self, *data: (
+        asked.append(str(self)), size(self, *data))[1])
+    with shortcuts():
+        context.get_abi_sizeof(pair)
+        asked.clear()
+        assert ([context.get_abi_sizeof(each) for each in (pair, named)],
+                hash(tuple_type)) == plain
+    assert plain[0] == [16, 8]
+    assert asked == ['%"pair"']  # its body may have been set since
+
+
+def test_names_of_values_are_numbered_as_they_are_without():
+    names = ['a', 'a', 'b', 'a.1', 'a', 'a.1', '', '', 'b']
+
+    def registered():
+        scope = NameScope()
+        return [scope.register(name, deduplicate=True) for name in names]
+    plain = registered()
+    with shortcuts():
+        assert registered() == plain
+        scope = NameScope()
+        scope.register('a')
+        with pytest.raises(DuplicatedNameError):
+            scope.register('a')
+    assert plain[:5] == ['a', 'a.1', 'b', 'a.1.1', 'a.2']
+
+
+def test_listeners_get_all_events_but_those_of_locks():
+    got = {kind: event.RecordingListener() for kind in ('numba:llvm_lock', 'numba:compile')}
+    for kind, listener in got.items():
+        event.register(kind, listener)
+    try:
+        with shortcuts():
+            for kind in got:
+                event.start_event(kind)
+                event.end_event(kind)
+    finally:
+        for kind, listener in got.items():
+            event.unregister(kind, listener)
+    assert [len(listener.buffer) for listener in got.values()] == [0, 2]
+
+
+def looped(n):
+    total = 0
+    for i in range(n):
+        if i % 3:
+            square = i * i
+            total += square
+    return total
+
+
+def generated(n):
+    for i in range(n):
+        yield -i
+
+
+@pytest.mark.parametrize('function', [looped, generated])
+@pytest.mark.parametrize('emit_dels', [False, True])
+def test_variables_end_where_they_end_without(function, emit_dels):
+    def processed():
+        state = compiler.run_frontend(function)
+        PostProcessor(state).run(emit_dels=emit_dels)
+        text = io.StringIO()
+        state.dump(text)
+        return text.getvalue(), state.variable_lifetime.livemap, state.generator_info is None
+    plain = processed()
+    with shortcuts():
+        assert processed() == plain
+    assert ('del i' in plain[0]) == emit_dels
+
+
 @pytest.mark.parametrize('changed', [
     {'module': 'missing'}, {'path': 'Missing.__eq__'}, {'arguments': ('one', 'more')}])
 def test_a_method_that_numba_has_no_more_is_not_replaced(monkeypatch, changed):
-    shortcut = Shortcut('targetconfig', 'TargetConfig.__eq__', ('other',), lambda original: 0)
+    shortcut = Shortcut('numba.core.targetconfig', 'TargetConfig.__eq__', ('other',),
+                        lambda original: 0)
     found = kernel_shortcuts._found.__wrapped__
     monkeypatch.setattr(kernel_shortcuts, 'SHORTCUTS', (shortcut,))
     assert len(found()) == 1

@@ -17,6 +17,7 @@ from numba import types
 from numba.core.compiler_lock import global_compiler_lock
 
 _LOCK: Any = global_compiler_lock  # without types
+_LOCK_EVENTS = 'numba:llvm_lock', 'numba:compiler_lock'
 # types whose operators and functions give the same at each call with the same types
 _SIMPLE = (types.Number, types.Boolean, types.IntegerLiteral, types.Array, types.UniTuple)
 
@@ -24,8 +25,8 @@ _SIMPLE = (types.Number, types.Boolean, types.IntegerLiteral, types.Array, types
 class Shortcut(NamedTuple):
     """A method of numba, and what stands in for it."""
 
-    module: str  # of numba.core
-    path: str  # class and method
+    module: str  # of numba or llvmlite
+    path: str  # class and method, or a function
     arguments: tuple[str, ...]  # of the method, after self
     replacement: Callable[[Any], Any]  # of the method itself: what stands in for it
 
@@ -44,8 +45,13 @@ def _faster_hash(original: Any) -> Any:
 def _faster_equality(original: Any) -> Any:
     """Flags: most that are compared are the same object, or set the same options."""
     def equal(self: Any, other: Any) -> Any:
-        return self is other or (
-            type(self) is type(other) and self._values == other._values) or original(self, other)
+        if self is other:
+            return True
+        if type(self) is not type(other):
+            return original(self, other)
+        mine, others = self._values, other._values  # without defaults
+        return mine == others or all(
+            getattr(self, name) == getattr(other, name) for name in (*mine, *others))
     return equal
 
 
@@ -89,6 +95,79 @@ def _faster_calls(original: Any) -> Any:
     return get_call_type
 
 
+def _fewer_events(original: Any) -> Any:
+    """Events: each call of LLVM takes a lock, and numba reports it to all that time locks."""
+    def trigger(kind: str, *details: Any, **named: Any) -> None:
+        if kind not in _LOCK_EVENTS:
+            original(kind, *details, **named)
+    return trigger
+
+
+def _shorter_post_processing(original: Any) -> Any:
+    """Lifetimes of variables: computed when they are needed, which few passes do."""
+    post: Any = import_module('numba.core.postproc')
+    lifetimes, canonical = post.VariableLifetime, post.transforms.canonicalize_cfg
+
+    def run(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+        function = self.func_ir
+        if function.is_generator:
+            original(self, emit_dels, extend_lifetimes)
+            return
+        function.blocks = canonical(function.blocks)
+        function.variable_lifetime = lifetimes(function.blocks)
+        function.generator_info = None
+        if emit_dels:
+            self._insert_var_dels(extend_lifetimes=extend_lifetimes)
+    return run
+
+
+def _known_sizes(original: Any) -> Any:
+    """Sizes of LLVM's types: numba has LLVM parse a module for each time it needs one."""
+    known: dict[str, int] = {}
+
+    def get_abi_sizeof(self: Any, ty: Any) -> int:
+        text = str(ty)
+        if '%' in text:  # a name, which may mean another type later
+            size: int = original(self, ty)
+            return size
+        if text not in known:
+            known[text] = original(self, ty)
+        return known[text]
+    return get_abi_sizeof
+
+
+def _known_hashes(original: Any) -> Any:
+    """Hash of a type of tuples: of all types in it, the same each time."""
+    known: dict[int, tuple[int, Any]] = {}  # with the type, so that no other gets its id
+
+    def hash_of_types(self: Any) -> int:
+        if id(self) not in known:
+            known[id(self)] = original(self), self
+        return known[id(self)][0]
+    return hash_of_types
+
+
+def _faster_names(original: Any) -> Any:
+    """Names of LLVM's values: the next number of a name, without a call for each."""
+    scope: Any = import_module('llvmlite.ir._utils').NameScope()
+    if scope._useset != {''} or scope._basenamemap:
+        raise AttributeError(scope)  # of another version
+
+    def register(self: Any, name: str, deduplicate: bool = False) -> Any:
+        used, base = self._useset, name
+        if name in used:
+            if not deduplicate:
+                return original(self, name)
+            number = self._basenamemap[base]
+            while name in used:
+                number += 1
+                name = f'{base}.{number}'
+            self._basenamemap[base] = number
+        used.add(name)
+        return name
+    return register
+
+
 def _inner_lowering(original: Any) -> Any:
     """Functions of numba that a kernel calls: optimised where they are linked, as kernels are."""
     from uav_task_alloc.kernel_inner import begin_inner_library, replaces_known_methods
@@ -102,12 +181,19 @@ def _inner_lowering(original: Any) -> Any:
 
 
 SHORTCUTS = (
-    Shortcut('targetconfig', 'TargetConfig.__hash__', (), _faster_hash),
-    Shortcut('targetconfig', 'TargetConfig.__eq__', ('other',), _faster_equality),
-    Shortcut('ir', 'Inst._rec_list_vars', ('val',), _faster_variables),
-    Shortcut('types.functions', 'BaseFunction.get_call_type', ('context', 'args', 'kws'),
-             _faster_calls),
-    Shortcut('typed_passes', 'NativeLowering.run_pass', ('state',), _inner_lowering))
+    Shortcut('numba.core.targetconfig', 'TargetConfig.__hash__', (), _faster_hash),
+    Shortcut('numba.core.targetconfig', 'TargetConfig.__eq__', ('other',), _faster_equality),
+    Shortcut('numba.core.ir', 'Inst._rec_list_vars', ('val',), _faster_variables),
+    Shortcut('numba.core.types.functions', 'BaseFunction.get_call_type',
+             ('context', 'args', 'kws'), _faster_calls),
+    Shortcut('numba.core.types', 'BaseTuple.__hash__', (), _known_hashes),
+    Shortcut('numba.core.cpu', 'CPUContext.get_abi_sizeof', ('ty',), _known_sizes),
+    Shortcut('numba.core.event', 'start_event', ('kind', 'data'), _fewer_events),
+    Shortcut('numba.core.event', 'end_event', ('kind', 'data', 'exc_details'), _fewer_events),
+    Shortcut('numba.core.postproc', 'PostProcessor.run', ('emit_dels', 'extend_lifetimes'),
+             _shorter_post_processing),
+    Shortcut('llvmlite.ir._utils', 'NameScope.register', ('name', 'deduplicate'), _faster_names),
+    Shortcut('numba.core.typed_passes', 'NativeLowering.run_pass', ('state',), _inner_lowering))
 
 
 def _hash_ignores_values(kind: Any) -> bool:
@@ -120,17 +206,18 @@ def _hash_ignores_values(kind: Any) -> bool:
 
 @functools.cache
 def _found() -> tuple[tuple[Any, str, Any, Any], ...]:
-    """Class, name, method (None: inherited) and what stands in for it, where numba has it."""
+    """Class or module, name, its own (None: inherited) and what stands in for it, where known."""
     found = []
     for module, path, arguments, replacement in SHORTCUTS:
-        owner, name = path.split('.')
+        *names, name = path.split('.')
         try:
-            kind = getattr(import_module(f'numba.core.{module}'), owner)
-            original = getattr(kind, name)
-            own = vars(kind).get(name)
-            if tuple(signature(original).parameters) == ('self', *arguments) and (
-                    name != '__hash__' or _hash_ignores_values(kind)):
-                found.append((kind, name, own, replacement(original)))
+            owner = functools.reduce(getattr, names, import_module(module))
+            original = getattr(owner, name)
+            own = vars(owner).get(name)
+            expected = *('self' for _ in names), *arguments
+            if tuple(signature(original).parameters) == expected and (
+                    replacement is not _faster_hash or _hash_ignores_values(owner)):
+                found.append((owner, name, own, replacement(original)))
         except (ImportError, AttributeError):  # of another version
             continue
     return tuple(found)
