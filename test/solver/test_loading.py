@@ -61,12 +61,32 @@ def test_the_reason_of_a_task_that_nobody_can_reach_in_time_finds_all_kernels_lo
     assert done.stdout == 'True\nlate:\n'
 
 
+FOR_PYTHON = """
+from uav_task_alloc.geometry import scene, shortest_path
+from uav_task_alloc.geometry.detour import find_detour
+from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.solver.solve import load_kernels
+
+load_kernels(zones=True)
+dome = ThreatZone.hemisphere('dome', (50.0, 0.0, 0.0), 20.0)
+print(len(find_detour((0.0, 0.0, 0.0), (90.0, 0.0, 5.0), [dome]).points) > 0)
+for kernel in (shortest_path.shortest_path, shortest_path.path_clears, scene.stored_ends):
+    print('from_python' in vars(kernel))
+"""
+
+
+def test_kernels_that_search_paths_are_compiled_only_within_those_that_call_them():
+    done = subprocess.run([sys.executable, '-c', FOR_PYTHON], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout.split() == ['True', 'False', 'False', 'False']
+
+
 NO_ZONES = """
-from uav_task_alloc.geometry import detour, distances, obstacles
+from uav_task_alloc.geometry import distances, obstacles, shortest_path
 from uav_task_alloc.solver.solve import load_kernels
 
 load_kernels()
-for kernel in (detour.shortest_path, distances.stored_path, obstacles.containing_zones):
+for kernel in (shortest_path.shortest_path, distances.stored_path, obstacles.containing_zones):
     print(len(kernel.signatures))
 """
 

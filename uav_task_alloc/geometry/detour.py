@@ -10,18 +10,9 @@ import numpy as np
 
 from uav_task_alloc.checks import check_point
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.escape import escape_point
-from uav_task_alloc.geometry.obstacles import (
-    Floats,
-    Obstacles,
-    containing_zones,
-    first_containing,
-    pack,
-)
-from uav_task_alloc.geometry.scene import ordered_ends
-from uav_task_alloc.geometry.search_budget import SearchBudget, new_work
-from uav_task_alloc.geometry.shortest_path import shortest_path
-from uav_task_alloc.geometry.taut import MAX_CORNERS
+from uav_task_alloc.geometry.obstacles import Floats, Obstacles, containing_zones, pack
+from uav_task_alloc.geometry.scene import path_found
+from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import Point, ThreatZone
 
 
@@ -107,7 +98,7 @@ def find_detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZo
     goal_inside = _around(obstacles, zones, goal)
     if goal_inside:
         return Detour(math.inf, (), start_inside, goal_inside)
-    length, points = path_between(obstacles, start, goal, limits, bool(start_inside), budget)
+    length, points = path_between(obstacles, start, goal, limits, budget)
     if math.isnan(length):
         return Detour(math.inf, (), start_inside, given_up=True)
     return Detour(length, points, start_inside, (), math.isinf(length))
@@ -129,39 +120,24 @@ def check_limits(altitude_min: float, altitude_max: float) -> Floats:
 
 
 def path_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
-                 start_inside: bool,
                  budget: SearchBudget | None = None) -> tuple[float, tuple[Point, ...]]:
     """Find the shortest path from a start to a goal outside all zones.
 
     Args:
         obstacles: the enlarged zones.
-        start: [m] ENU.
+        start: [m] ENU; inside a zone the path first leads out of it.
         goal: [m] ENU.
         limits: altitude_min and altitude_max [m].
-        start_inside: the start is inside a zone and has to be left first.
         budget: what the search may spend; None: no limit.
 
     Returns:
         Length [m] and waypoints [m] without both ends. inf: there is no path; NaN: none was found
         within the budget.
     """
-    work = new_work(budget.state.ctypes.data if budget else 0)
-    first: tuple[Point, ...] = ()
-    before, place = 0.0, np.array(start)
-    if start_inside:
-        place = escape_point(obstacles.rows, place, limits, work)
-        if work[2] or math.isnan(place[0]):
-            return math.nan if work[2] else math.inf, ()
-        first = as_points(place[None])
-        before = math.dist(start, first[0])
-    ends, buffer = np.empty((2, 3)), np.empty((MAX_CORNERS, 3))
-    swapped = ordered_ends(place, np.array(goal), ends)
-    no_skin = any(first_containing(obstacles.rows, x, y, z, False) >= 0 for x, y, z in ends)
-    n, length = shortest_path(obstacles.rows, ends, limits, no_skin, buffer, work)
-    via = as_points(buffer[1:max(1, n - 1)])
-    if not math.isfinite(length):
-        return float(length), ()
-    return before + float(length), (*first, *(via[::-1] if swapped else via))
+    length, path, exits = path_found(np.array([start, goal]), obstacles.rows, limits, budget)
+    first = as_points(exits)
+    before = math.dist(start, first[0]) if first else 0.0
+    return before + length, (*first, *as_points(path[1:-1]))
 
 
 def as_points(rows: Floats) -> tuple[Point, ...]:

@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import as_points, check_limits, path_between
 from uav_task_alloc.geometry.numba_pointers import call_float, floats_at, ints_at
-from uav_task_alloc.geometry.obstacles import Ints, Obstacles, containing_zones, pack
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, containing_zones, pack
 from uav_task_alloc.geometry.path_store import PathStore, store_path
-from uav_task_alloc.geometry.points import path_length
+from uav_task_alloc.geometry.points import path_length, reverse_points
+from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.geometry.scene import (
     BUDGET_INDEX,
     INSIDE,
@@ -29,6 +30,7 @@ from uav_task_alloc.geometry.scene import (
     join_address,
     make_scene,
     scene_addresses,
+    scene_at,
     stored_ends,
     stored_path,
 )
@@ -160,7 +162,7 @@ def _known_length(pairs: Pairs, i: int, j: int) -> float:
     return np.nan
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _store_length(pairs: Pairs, i: int, j: int, found: float) -> None:
     """Store the length of a path from i to j, which is outside all zones. O(1)"""
     location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
@@ -203,6 +205,20 @@ def _ensure(pairs: Pairs, origins: Ints, goals: Ints) -> None:
     """Search for the lengths of all pairs (origins[m], goals[m]), int64 (n,)."""
     for m in range(origins.size):
         length(pairs, origins[m], goals[m])
+
+
+@allocating_kernel
+def _take_path(pairs: Pairs, i: int, j: int, path: Floats, n: int) -> bool:
+    """Store path[:n] from i to j, if it is clear, or leave it reversed; O(zones n)."""
+    scene, ends = scene_at(pairs.scene), np.empty((2, 3))
+    if stored_ends(scene, i, j, ends):
+        reverse_points(path, 0, n)
+    no_skin = scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN
+    if not path_clears(scene.zones, path, n, min(ends[0, 2], ends[1, 2]), no_skin):
+        return False
+    store_path(scene.store, path, n, ends)
+    _store_length(pairs, i, j, path_length(path, n))
+    return True
 
 
 class Distances:
@@ -320,15 +336,11 @@ class Distances:
         scene = self._scene
         if INSIDE in (scene.location[i], scene.location[j]):
             return False
-        no_skin = bool(scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN)
-        ends, path = np.empty((2, 3)), np.empty((MAX_CORNERS, 3))
-        swapped = stored_ends(scene, i, j, ends)
+        path = np.empty((MAX_CORNERS, 3))
         for first in range(len(via) + 1 if len(via) < MAX_CORNERS - 1 else 0):
             rest = [self._point(i), *via[first:], self._point(j)]
-            path[:len(rest)] = rest[::-1] if swapped else rest
-            if path_clears(scene.zones, path, len(rest), min(ends[0, 2], ends[1, 2]), no_skin):
-                store_path(self._store.address, path, len(rest), ends)
-                _store_length(self.pairs, i, j, path_length(path, len(rest)))
+            path[:len(rest)] = rest
+            if _take_path(self.pairs, i, j, path, len(rest)):
                 return True
         return False
 
@@ -354,11 +366,12 @@ class Distances:
         if known >= 0.0:
             path = np.empty((MAX_CORNERS, 3))
             n = stored_path(scene, i, j, path)
-            if n and abs(path_length(path, n) - known) < 1e-6:
-                return Leg(as_points(path[1:n - 1]), known)
+            points = as_points(path[:n])
+            if n and abs(polyline_length(points) - known) < 1e-6:
+                return Leg(points[1:-1], known)
         metres, points = path_between(
             self._obstacles, self._point(i), self._point(j), scene.limits,
-            bool(scene.location[i] == INSIDE), None if known >= 0.0 else self.budget)
+            None if known >= 0.0 else self.budget)
         return Leg(points, math.inf if math.isnan(metres) else metres)
 
     def given_up(self, i: int, j: int) -> bool:

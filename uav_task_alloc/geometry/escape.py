@@ -19,7 +19,7 @@ from uav_task_alloc.geometry.obstacles import (
     squared_segment_distance,
 )
 from uav_task_alloc.geometry.search_budget import spend
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
+from uav_task_alloc.kernel import inner_allocating_kernel
 
 _DIRECTIONS = 24  # tried at first at each of two elevations: level and rising
 
@@ -113,7 +113,7 @@ def _initial_directions(zones: Zones, p: Floats, limits: Floats, best: Floats,
         _try_direction(zones, p, base + az, up, limits, best, work)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def escape_point(zones: Zones, p: Floats, limits: Floats, work: Ints) -> Floats:
     """The nearest point outside all zones on a ray from p, which is inside some.
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from uav_task_alloc.geometry.outline import Floats
-from uav_task_alloc.kernel import kernel
+from uav_task_alloc.kernel import inner_kernel
 from uav_task_alloc.model import Point, Task, Uav
 
 
@@ -31,10 +31,10 @@ def straight_time(dx: float, dy: float, dz: float, cruise: float, climb: float,
     return max(math.sqrt(dx * dx + dy * dy) / cruise, vertical)
 
 
-straight_time_kernel = kernel(straight_time)  # the same, for kernels
+straight_time_kernel = inner_kernel(straight_time)  # the same, for kernels
 
 
-@kernel
+@inner_kernel
 def path_time(points: Floats, n: int, cruise: float, climb: float, descent: float) -> float:
     """Time [s] of the polyline points[:n], float64 (n, 3) [m], at these speeds at most. O(n)"""
     total = 0.0

@@ -285,7 +285,7 @@ def contains(zone: Zone, x: float, y: float, z: float, no_skin: bool) -> bool:
     return blocked(zone, x, y, z, x, y, z, -np.inf, no_skin)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def first_containing(zones: Zones, x: float, y: float, z: float, no_skin: bool) -> int:
     """Index of the first zone that contains a point; -1: none. O(zones)"""
     for k in range(zones.size):

@@ -15,7 +15,7 @@ from uav_task_alloc.geometry.numba_pointers import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Floats
 from uav_task_alloc.geometry.points import copy_point
 from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
+from uav_task_alloc.kernel import inner_allocating_kernel
 
 SLOTS = 1 << 16  # for paths; a power of two
 PROBES = 4  # slots that a path may take
@@ -60,7 +60,7 @@ def _same(points: Floats, first: int, ends: Floats) -> bool:
     return True
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def store_path(address: int, path: Floats, n: int, ends: Floats) -> None:
     """Store the polyline path[:n] under its ends; O(n).
 

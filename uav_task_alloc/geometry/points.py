@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from uav_task_alloc.geometry.outline import Floats
-from uav_task_alloc.kernel import inner_kernel, kernel
+from uav_task_alloc.kernel import inner_kernel
 
 
 @inner_kernel
@@ -30,7 +30,7 @@ def reverse_points(p: Floats, first: int, n: int) -> None:
             p[j, c], p[k, c] = p[k, c], p[j, c]
 
 
-@kernel
+@inner_kernel
 def path_length(p: Floats, n: int) -> float:
     """Length [m] of the polyline p[:n]; O(n)."""
     total = 0.0

@@ -22,7 +22,7 @@ from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.kernel import allocating_kernel, c_function, inner_allocating_kernel
 
 OUTSIDE, WITHIN_SKIN, INSIDE = 0, 1, 2
-LOCATION_INDEX, BUDGET_INDEX = 3, 7  # in scene_addresses
+LOCATION_INDEX, BUDGET_INDEX, _PATH_INDEX = 3, 7, 9  # in scene_addresses
 
 
 class PathScene(NamedTuple):
@@ -38,12 +38,13 @@ class PathScene(NamedTuple):
 
 
 def make_scene(xyz: Floats, zones: Zones, limits: Floats, budget: SearchBudget,
-               store: PathStore) -> PathScene:
+               store: PathStore | None) -> PathScene:
     """The scene of points (n, 3) [m]; escape points are searched for when first needed."""
     location, exits = np.zeros(len(xyz), np.int64), np.full((len(xyz), 3), np.inf)
     if zones.size:
         _locate_all(zones, xyz, location)
-    return PathScene(xyz, location, exits, limits, zones, budget.state, store.address)
+    return PathScene(xyz, location, exits, limits, zones, budget.state,
+                     store.address if store else 0)
 
 
 @inner_allocating_kernel
@@ -74,13 +75,16 @@ def _exit_point(scene: PathScene, i: int, work: Ints) -> Floats:
 
 
 def scene_addresses(scene: PathScene) -> Ints:
-    """Sizes and addresses of the scene's arrays, int64 (9,), as `scene_at` reads them."""
+    """Sizes and addresses of the scene's arrays, int64 (10,), as `scene_at` reads them.
+
+    The last is of an array that `_find` writes the path to instead of storing it; 0: none.
+    """
     return np.array([len(scene.xyz), len(scene.zones),
-                     *(array.ctypes.data for array in scene[:6]), scene.store], np.int64)
+                     *(array.ctypes.data for array in scene[:6]), scene.store, 0], np.int64)
 
 
 @inner_allocating_kernel
-def _scene_at(address: int) -> PathScene:
+def scene_at(address: int) -> PathScene:
     """The scene whose `scene_addresses` are at an address."""
     at = ints_at(address)
     n, k = at[0], at[1]
@@ -90,7 +94,7 @@ def _scene_at(address: int) -> PathScene:
         carray(zones_at(at[6]), k), carray(ints_at(at[7]), 5), at[8])
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def ordered_ends(p: Floats, q: Floats, ends: Floats) -> bool:
     """Write p and q into ends in lexical order, one for both directions; True: swapped."""
     swapped = bool(p[0] > q[0] or (
@@ -100,7 +104,7 @@ def ordered_ends(p: Floats, q: Floats, ends: Floats) -> bool:
     return swapped
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def stored_ends(scene: PathScene, i: int, j: int, ends: Floats) -> bool:
     """Write the ends under which the path from i to j is stored.
 
@@ -152,7 +156,7 @@ def _join(address: int, i: int, between: int) -> float:
     Returns:
         Its length [m]; inf: they are not known, or have too many points.
     """
-    scene, k, j = _scene_at(address), between >> 32, between & 0xFFFFFFFF
+    scene, k, j = scene_at(address), between >> 32, between & 0xFFFFFFFF
     path, onward = np.empty((2 * MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
     n, more = stored_path(scene, i, k, path), stored_path(scene, k, j, onward)
     if n == 0 or more == 0 or n + more > MAX_CORNERS or scene.location[k] == INSIDE:
@@ -169,13 +173,13 @@ def _join(address: int, i: int, between: int) -> float:
 
 def _find(address: int, i: int, j: int) -> float:
     """Length [m] of the path from point i to point j; inf: none, NaN: not known."""
-    scene = _scene_at(address)
+    scene = scene_at(address)
     if i == j:
         return 0.0
     if scene.location[j] == INSIDE:
         return np.inf
-    budget = ints_at(address)[BUDGET_INDEX]
-    if is_exhausted(budget):
+    budget, to = ints_at(address)[BUDGET_INDEX], ints_at(address)[_PATH_INDEX]
+    if to == 0 and is_exhausted(budget):
         return np.nan
     work, p, q, first = new_work(budget), scene.xyz[i], scene.xyz[j], 0.0
     if scene.location[i] == INSIDE:
@@ -186,10 +190,14 @@ def _find(address: int, i: int, j: int) -> float:
                            p[2] - scene.xyz[i, 2])
     ends = np.empty((2, 3))
     swapped = ordered_ends(p, q, ends)
-    no_skin = scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN
-    path = np.empty((MAX_CORNERS + 1, 3))
+    no_skin = scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN or (
+        to != 0 and locate(scene.zones, p) != OUTSIDE)
+    path = np.empty((MAX_CORNERS + 1, 3)) if to == 0 else carray(
+        floats_at(to), (MAX_CORNERS + 1, 3))
     n, length = shortest_path(scene.zones, ends, scene.limits, no_skin, path[1:], work)
-    if n > 1:
+    if to != 0:
+        path[0, 0], path[0, 1], path[0, 2] = n, length, 1.0 if swapped else 0.0
+    elif n > 1:
         if scene.location[i] != INSIDE:
             if n > 2:
                 store_path(scene.store, path[1:], n, ends)
@@ -200,6 +208,34 @@ def _find(address: int, i: int, j: int) -> float:
             stored_ends(scene, i, j, ends)
             store_path(scene.store, path, n + 1, ends)
     return first + length
+
+
+def path_found(xyz: Floats, obstacles: Zones, limits: Floats,
+               budget: SearchBudget | None) -> tuple[float, Floats, Floats]:
+    """Search for the path between two points, and store it nowhere.
+
+    Args:
+        xyz: both points, (2, 3) [m]; the second is outside all zones.
+        obstacles: rows of the enlarged zones.
+        limits: altitude_min, altitude_max [m].
+        budget: None: no limit.
+
+    Returns:
+        Length [m] of the path outside zones (inf: there is none, NaN: not known), its points, and
+        the point where it leaves the zones that the first point is in: (0, 3) if it is in none.
+    """
+    scene = make_scene(xyz, obstacles, limits, budget or SearchBudget(), None)
+    addresses, path = scene_addresses(scene), np.zeros((MAX_CORNERS + 1, 3))
+    addresses[_PATH_INDEX] = path.ctypes.data
+    if budget is None:
+        addresses[BUDGET_INDEX] = 0
+    found = _compiled(_find).ctypes(addresses.ctypes.data, 0, 1)
+    if not math.isfinite(found):
+        return found, path[:0], path[:0]
+    n, length, swapped = int(path[0, 0]), float(path[0, 1]), path[0, 2] > 0.0
+    points = path[1:n + 1]
+    return (length, points[::-1] if swapped else points,
+            scene.exits[:1] if scene.location[0] == INSIDE else path[:0])
 
 
 def _time(address: int, i: int, j: int) -> float:
@@ -213,7 +249,7 @@ def _time(address: int, i: int, j: int) -> float:
         NaN: the path is not known.
     """
     at = ints_at(address)
-    scene, speed, path = _scene_at(at[0]), floats_at(at[1]), np.empty((MAX_CORNERS, 3))
+    scene, speed, path = scene_at(at[0]), floats_at(at[1]), np.empty((MAX_CORNERS, 3))
     n = stored_path(scene, i, j, path)
     return path_time(path, n, speed[0], speed[1], speed[2]) if n > 0 else np.nan
 

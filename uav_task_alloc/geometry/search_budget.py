@@ -17,7 +17,7 @@ import numpy as np
 
 from uav_task_alloc.geometry.numba_pointers import call_float, ints_at
 from uav_task_alloc.geometry.obstacles import Ints
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
+from uav_task_alloc.kernel import inner_allocating_kernel
 
 UNCHECKED, EXHAUSTED, MAX_UNITS, CUT_SHORT, CLOCK = range(5)  # indices of the state
 _EVERY = 50_000  # units between two polls of the clock
@@ -96,7 +96,7 @@ def is_exhausted(address: int) -> bool:
     return address != 0 and ints_at(address)[EXHAUSTED] != 0
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def new_work(address: int) -> Ints:
     """The work of a new search, int64 (3,), for the budget whose state is at an address."""
     work = np.zeros(3, np.int64)

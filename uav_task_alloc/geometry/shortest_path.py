@@ -14,7 +14,7 @@ from uav_task_alloc.geometry.search_budget import spend
 from uav_task_alloc.geometry.single_obstacle import keep_best, path_past_zone
 from uav_task_alloc.geometry.taut import MAX_CORNERS, tauten, zones_near
 from uav_task_alloc.geometry.visibility_graph import add_corners, add_level, astar, corner_bound
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
+from uav_task_alloc.kernel import inner_allocating_kernel
 
 _RINGS = (12, 24, 64)  # corners around a zone; finer ones where no path was found
 FEW_ZONES = 2  # blocking zones up to which the first ring is fine enough
@@ -193,7 +193,7 @@ def _search(zones: Zones, ends: Floats, limits: Floats, floor: float, no_skin: b
             return 0
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def path_clears(zones: Zones, p: Floats, n: int, floor: float, no_skin: bool) -> bool:
     """Whether the polyline p[:n] enters no zone; O(zones n), most of them by their boxes."""
     x, y, z = p[0, 0], p[0, 1], p[0, 2]
@@ -213,7 +213,7 @@ def path_clears(zones: Zones, p: Floats, n: int, floor: float, no_skin: bool) ->
     return True
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def shortest_path(zones: Zones, ends: Floats, limits: Floats, no_skin: bool, out: Floats,
                   work: Ints) -> tuple[int, float]:
     """Write the shortest safe path between two ends, both outside all zones, into `out`.
