@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel, inner_kernel
+from uav_task_alloc.kernel import inner_kernel, kernel
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints
 
@@ -52,10 +52,9 @@ def _bound(a: Arrays, pool: Pool, price: Floats, reduced: Floats, least: Floats,
     return bound
 
 
-@inner_allocating_kernel
-def _first_prices(a: Arrays, pool: Pool, flown: Ints) -> Floats:
+@inner_kernel
+def _set_first_prices(a: Arrays, pool: Pool, flown: Ints, price: Floats) -> None:
     """First multipliers by node: the costs of the columns flown, split among their tasks. O(n)."""
-    price = np.zeros(a.ends)
     for t in range(a.uavs, a.ends):
         price[t] = a.unassigned_cost[t - a.uavs]
     for e in flown:
@@ -63,7 +62,6 @@ def _first_prices(a: Arrays, pool: Pool, flown: Ints) -> Floats:
         for i in range(begin, end):
             t = pool.stops[i]
             price[t] = min(price[t], pool.cost[e] / (end - begin))
-    return price
 
 
 @inner_kernel
@@ -83,7 +81,6 @@ def _count(pool: Pool, chosen: Ints, served: Ints) -> None:
                 served[pool.stops[i]] += 1
 
 
-@allocating_kernel
 def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
                   work: float) -> tuple[Reduced, float]:
     """Reduced costs for a high lower bound [m], and that bound. O(work).
@@ -91,11 +88,23 @@ def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
     flown: (m) column of each UAV or -1; they and unassigned tasks cost `worth` [m]; `work` is how
     many stops of the pool may be read.
     """
-    price = _first_prices(a, pool, flown)
-    best_price, highest, length, stalled = np.empty(price.size), -np.inf, 1.0, 0
+    costs = Reduced(np.empty(pool.size[0]), np.empty(a.uavs), np.zeros(a.ends))
+    bound = _set_reduced_costs(a, pool, flown, worth, work, costs, np.zeros(a.ends),
+                               np.empty(a.uavs, np.int64), np.empty(a.ends, np.int64))
+    return costs, float(bound)
+
+
+@kernel
+def _set_reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float, work: float,
+                       costs: Reduced, price: Floats, chosen: Ints, served: Ints) -> float:
+    """As `reduced_costs`, into arrays made before; price, chosen and served are its own.
+
+    A kernel that makes arrays counts references, and takes twice as long to compile.
+    """
+    reduced, least, best_price = costs.column, costs.stay, costs.unassigned
+    _set_first_prices(a, pool, flown, price)
+    highest, length, stalled = -np.inf, 1.0, 0
     _copy(price, best_price)
-    reduced, least = np.empty(pool.size[0]), np.empty(a.uavs)
-    chosen, served = np.empty(a.uavs, np.int64), np.empty(a.ends, np.int64)
     steps = work / max(1, pool.first[pool.size[0]])
     for _ in range(int(min(MAX_STEPS, max(MIN_STEPS, steps)))):
         bound = _bound(a, pool, price, reduced, least, chosen)
@@ -125,4 +134,4 @@ def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
         least[u] = -least[u]
     for t in range(a.uavs, a.ends):
         best_price[t] = a.unassigned_cost[t - a.uavs] - best_price[t]
-    return Reduced(reduced, least, best_price), highest
+    return highest
