@@ -169,6 +169,19 @@ def test_loads_of_two_threads_are_counted_together_after_one_line(capsys):
     assert capsys.readouterr().err == 'compiling kernels (once, about 30 s)\n'
 
 
+def test_what_is_loaded_as_a_part_is_counted_once(capsys):
+    terminal = io.StringIO()
+    terminal.isatty = lambda: True
+    notice = CompilationNotice(lambda: 0.0)
+    with notice.shown_on(terminal), notice.until_loaded('all', KernelWork(9.0, 3), whole=True):
+        for name in 'first', 'second', 'third':
+            with notice.until_loaded(name, KernelWork(3.0, 1)):
+                compile_one(notice, name)
+    shown = [line.split(',')[0] for line in terminal.getvalue().split('\r\x1b[K')[1:]]
+    assert shown == [*(f'compiling kernel {k} of 3' for k in (1, 2, 3)), '']
+    assert capsys.readouterr().err == 'compiling kernels (once, about 9 s)\n'
+
+
 def test_kernels_compiled_before_the_first_load_need_no_second_line(capsys):
     notice = CompilationNotice(lambda: 0.0)
     compile_one(notice, 'zones of the random arrivals of a scenario')

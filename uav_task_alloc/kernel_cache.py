@@ -57,9 +57,9 @@ class KernelWork(NamedTuple):
 NO_WORK = KernelWork(0.0, 0)
 # chain_q up to its first plan, its search; the same of problems with time; paths around zones;
 # on a core of an Intel Xeon server
-FIRST_WORK, SEARCH_WORK = KernelWork(6.0, 28), KernelWork(7.0, 54)
-TIMED_FIRST_WORK, TIMED_SEARCH_WORK = KernelWork(12.0, 71), KernelWork(6.0, 20)
-ZONES_WORK = KernelWork(10.0, 103)
+FIRST_WORK, SEARCH_WORK = KernelWork(6.0, 28), KernelWork(7.5, 55)
+TIMED_FIRST_WORK, TIMED_SEARCH_WORK = KernelWork(11.5, 72), KernelWork(5.5, 20)
+ZONES_WORK = KernelWork(9.5, 102)
 _UNUSED = 600.0  # [s] a folder of another hash is kept after the last write: it may be in use
 _SELDOM = 300_000, 50, 1000  # thresholds of the garbage collection, else a tenth of a load
 _COUNT_ON = 10  # kernels, before the time left follows from them
@@ -172,6 +172,7 @@ class CompilationNotice(event.Listener):
         self._began, self._compiled_before = 0.0, 0  # when the line was printed
         self._loading = 0  # in the main thread: depth of `until_loaded`
         self._loads, self._thresholds = 0, gc.get_threshold()  # in all threads
+        self._whole = False  # what is loaded is counted already
         self._replaced: Any = None
 
     def on_start(self, event: Any) -> None:
@@ -198,7 +199,7 @@ class CompilationNotice(event.Listener):
 
     @contextmanager
     def until_loaded(self, key: object, first: KernelWork, rest: KernelWork = NO_WORK,
-                     search: bool = True) -> Iterator[None]:
+                     search: bool = True, whole: bool = False) -> Iterator[None]:
         """Within it, from the first compilation to the end, Ctrl-C ends the process at once.
 
         Args:
@@ -206,14 +207,15 @@ class CompilationNotice(event.Listener):
             first: the kernels up to a first plan, which are loaded once.
             rest: those of the search.
             search: whether the search is loaded, too.
+            whole: `first` contains what is loaded within this.
         """
         left = NO_WORK if key in self._loaded else first
         now, later = (left.plus(rest), NO_WORK) if search else (left, rest)
-        if self._loads:  # of another thread: both are counted together
-            self._now = self._now.plus(now)
-        else:
-            self._now, self._later = now, later
+        if self._loads == 0:
+            self._now, self._later, self._whole = now, later, whole
             self._printed = self._printed and not self._loaded  # reading a scenario compiles some
+        elif not self._whole:  # of another thread: both are counted together
+            self._now = self._now.plus(now)
         main = threading.current_thread() is threading.main_thread()
         self._loading += main
         self._loads += 1

@@ -61,9 +61,9 @@ def test_a_bridge_that_exits_takes_no_list_and_starts_no_take_off(sky, probe):
     assert sky.states['uav_2'].list_revision == 0
 
 
-def session(uav_id, airborne, replacing_since):
+def session(uav_id, airborne, replacing_since, lost=False):
     return SimpleNamespace(uav_id=uav_id, executor=SimpleNamespace(
-        telemetry=SimpleNamespace(airborne=airborne),
+        telemetry=SimpleNamespace(airborne=airborne, lost=lambda now: lost),
         watch=SimpleNamespace(replacing_since=replacing_since)))
 
 
@@ -74,6 +74,13 @@ def test_an_upload_delays_the_exit_for_at_most_its_timeout():
     assert shutdown.waits(fleet, 100.0)
     assert shutdown.waits(fleet, 100.0 + 0.9 * UPLOAD_TIMEOUT)
     assert not shutdown.waits(fleet, 100.0 + UPLOAD_TIMEOUT)
+
+
+def test_an_upload_to_a_lost_vehicle_delays_no_exit():
+    lost = session('a', True, 5.0, lost=True)
+    assert not BridgeShutdown().waits([lost], 100.0)
+    assert BridgeShutdown().waits([lost, session('b', True, 5.0)], 100.0)
+    assert 'held in the air for a new list: a' in BridgeShutdown.warnings([lost])[0]
 
 
 def test_every_airborne_uav_is_named():

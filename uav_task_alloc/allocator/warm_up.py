@@ -12,6 +12,7 @@ from uav_task_alloc.allocator.replanning.planning import replan_problem, solve_p
 from uav_task_alloc.geometry.detour import find_detour
 from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.geometry.search_budget import SearchBudget
+from uav_task_alloc.kernel_cache import NOTICE, KernelWork
 from uav_task_alloc.model import Plan, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.conflicts import load_separation_kernels
@@ -19,6 +20,7 @@ from uav_task_alloc.solver.solve import load_kernels
 from uav_task_alloc.solver.timed.solve import load_timed_kernels
 
 _BUDGET = 0.05  # [s] of each solve
+_WORK = KernelWork(49.0, 330)
 _ZONES = (
     ThreatZone.hemisphere('dome', (100.0, 0.0, 0.0), 30.0),
     ThreatZone.cylinder('column', (300.0, 0.0), 30.0, 0.0, 100.0),
@@ -36,10 +38,16 @@ def compile_kernels(plan: Callable[..., Plan], params: AllocatorParams) -> int:
     Returns:
         The number of lists that were planned.
     """
-    load_kernels(zones=True)
-    load_timed_kernels(zones=True)  # any task may have a deadline
-    load_separation_kernels()  # its parameters may change at any time
-    load_waiting_kernels()  # so may `anticipate`
+    with NOTICE.until_loaded('allocator', _WORK, whole=True):
+        load_kernels(zones=True)
+        load_timed_kernels(zones=True)  # any task may have a deadline
+        load_separation_kernels()  # its parameters may change at any time
+        load_waiting_kernels()  # so may `anticipate`
+        return _planned(plan, params)
+
+
+def _planned(plan: Callable[..., Plan], params: AllocatorParams) -> int:
+    """Solve a small world; returns the number of lists."""
     params, before = replace(params, solve_budget=_BUDGET), Plan({})
     allocator = Allocator(params, now=0.0)
     allocator.set_kernels_ready()

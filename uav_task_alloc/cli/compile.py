@@ -26,7 +26,7 @@ def main(argv: Sequence[str]) -> int:
                         help='remove the compiled kernels instead, before the package is '
                              'uninstalled (default: compile)')
     remove = parser.parsed(argv).remove
-    from uav_task_alloc.kernel_cache import NOTICE, kernel_folders  # imports numba
+    from uav_task_alloc.kernel_cache import NOTICE, KernelWork, kernel_folders  # imports numba
     if remove:
         for folder in kernel_folders():
             shutil.rmtree(folder)
@@ -35,7 +35,8 @@ def main(argv: Sequence[str]) -> int:
     from uav_task_alloc.allocator.warm_up import compile_kernels
     from uav_task_alloc.solver.solve import plan
     from uav_task_alloc.solver.timed.solve import load_timed_kernels
-    with NOTICE.shown_on(sys.stderr):
+    with NOTICE.shown_on(sys.stderr), NOTICE.until_loaded(
+            'all', KernelWork(68.0, 415), whole=True):
         compile_kernels(plan, AllocatorParams())
         load_timed_kernels(zones=True, paths=True)  # of lines, areas and orbits
     for folder in kernel_folders():

@@ -21,9 +21,13 @@ class BridgeShutdown:
         self.requested_at: float | None = None
 
     def waits(self, fleet: Iterable[VehicleSession], now: float) -> bool:
-        """Whether a UAV is held for an upload; False once UPLOAD_TIMEOUT is over."""
+        """Whether a UAV is held for an upload; False once UPLOAD_TIMEOUT is over.
+
+        Not for one whose link is lost.
+        """
         self.requested_at = now if self.requested_at is None else self.requested_at
-        return now - self.requested_at < UPLOAD_TIMEOUT and any(held_for_upload(fleet))
+        return now - self.requested_at < UPLOAD_TIMEOUT and any(held_for_upload(
+            session for session in fleet if not session.executor.telemetry.lost(now)))
 
     @staticmethod
     def warnings(fleet: Iterable[VehicleSession]) -> list[str]:

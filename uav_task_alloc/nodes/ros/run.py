@@ -2,6 +2,7 @@
 """Runs a node until SIGINT or SIGTERM, and shuts it down in order with exit status 0."""
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import re
@@ -26,6 +27,7 @@ from uav_task_alloc.parameter_field import CheckedParams
 from uav_task_alloc.parameter_texts import help_text
 
 CRASHED = 70  # exit status, EX_SOFTWARE of sysexits.h: the launch files restart the node
+_ENDS = 8.0  # [s] after which a node that is to end logs where it hangs
 # what ROS could not parse, by its own words
 _EXPECTED = {'parameter override rule': '-p NAME:=VALUE, a list with values of one type',
              'remap rule': '-r FROM:=TO', 'params file': 'a parameter file',
@@ -85,9 +87,11 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
     except _REFUSALS as error:
         sys.exit(_one_line(error))
     finally:
+        faulthandler.dump_traceback_later(_ENDS, file=2)
         for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not cut this short
             signal.signal(number, signal.SIG_IGN)
         rclpy.try_shutdown()
+        faulthandler.cancel_dump_traceback_later()
 
 
 def _spin(node: Node, threads: int, signals: list[int]) -> None:
@@ -101,6 +105,7 @@ def _spin(node: Node, threads: int, signals: list[int]) -> None:
     except Exception:
         traceback.print_exc()
         sys.exit(CRASHED)
+    faulthandler.dump_traceback_later(_ENDS, file=2)
     executor.shutdown()
     node.destroy_node()
 
