@@ -200,3 +200,32 @@ def test_a_reached_before_the_first_position_is_of_a_place_from_which_it_can_hav
     assert bench.run(lambda: distance(bench, at_b) > 60.0, 30.0)
     bench.run(limit=4.0)
     assert ('B' in bench.completed()) is known
+
+
+@BOTH
+@pytest.mark.parametrize('read_first', [True, False])
+def test_a_task_passed_before_a_reboot_is_known_though_the_mission_was_read_after_it(
+        kind, read_first):
+    bench, rebooted = flying(kind, 'ABC'), []
+    bench.run(lambda: distance(bench, AT_A) < 15.0)
+    bench.kill_and_restart(0.0, store=False)
+
+    def noticed():
+        return any('was restarted' in note for note in bench.notes)
+
+    def lose(direction, m, now):
+        if m.get_type() == 'MISSION_ITEM_INT':
+            return None if rebooted and (read_first or noticed()) else []
+        late = read_first and rebooted and bench.onboard().held is None
+        return [] if m.get_type() == 'MISSION_ITEM_REACHED' or (
+            late and hasattr(m, 'time_boot_ms')) else None
+    bench.line.tampers.append(lose)
+    bench.assign(task_list('ABC', 2))
+    assert bench.run(lambda: places(bench) == ['A'], 20.0)
+    bench.run(limit=2.0)
+    assert bench.onboard().held is None
+    assert bench.completed() == []
+    bench.vehicles[1].reboot(bench.now)
+    rebooted.append(bench.now)
+    assert bench.run(lambda: bench.completed() == ['A'], 40.0)
+    assert noticed() is not read_first

@@ -16,7 +16,7 @@ from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
-from uav_task_alloc.mavlink.gcs.unread_reached import UnreadReached
+from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReports
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import (
     Item,
@@ -34,10 +34,7 @@ from uav_task_alloc.model import Point, Task
 
 _SAME_PLACE = 1.0  # [m]
 _MAX_MISSIONS = 4  # that were read and are kept
-_MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
-_PLACE_DELAY = 2.0  # [s] after a REACHED in which a position still shows its place
 _LANDED_STATE_DELAY = 3.0  # [s] after the mission was read in which it comes, as a rule
-_MAX_UNREAD = 32  # REACHED kept until the mission is read
 MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a new one
 _NAMED_AGE = 3540.0  # [s] more, where it is a task of the previous run, which recorded its id
 
@@ -75,7 +72,7 @@ class Resume:
         self._missions: tuple[tuple[Item, ...], ...] = ()  # read so far
         self.current_unreliable = False  # items before the current one may be unflown
         self._rebooted = self._passed_recorded = False
-        self._unread: list[UnreadReached] = []  # until the vehicle is located
+        self._unread = UnreadReports(telemetry, progress.positions, profile.atomic)
         self.reset()
 
     def note_mark(self, task: str, place: Point, flown: bool) -> None:
@@ -94,7 +91,8 @@ class Resume:
         """Reset after a restart of the vehicle, whose current item starts at the first."""
         _, recorded, arrived = self.recorded
         self._passed_recorded = arrived and recorded is not None and any(
-            seq > recorded for seq, _, _ in self._currents)
+            each.seq > recorded for each in self._unread.currents)
+        self._unread.restarted()
         self.passed = () if self.located else self.passed
         self.reset()
         self._rebooted = True
@@ -102,8 +100,7 @@ class Resume:
     def reset(self) -> None:
         """Forget the location: the vehicle was restarted, or is another one."""
         self.located = False
-        # current item, [s] received and number of the frame, until it is located
-        self._currents: list[tuple[int, float, int]] = []
+        self._unread.currents = []
         self._skipped: frozenset[int] = frozenset()  # earlier items that were not flown
         self._old: tuple[Item, ...] = ()  # flown in the previous run
         self._epoch, self._located_at = -1, 0  # epoch and seq of the location
@@ -114,50 +111,22 @@ class Resume:
 
     def note_current(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_CURRENT, home not counted; the first one shows what was flown before."""
-        if not self.located and len(self._currents) < _MAX_CURRENTS:
-            self._currents.append((seq, now, frame))
-        for reached in self._unread:
-            if frame > reached.frame:
-                reached.current_after = max(seq, reached.current_after or 0)
-            if reached.place is None and self._telemetry.has_position and (
-                    now - reached.at < _PLACE_DELAY):
-                reached.place_later(self._telemetry.position, self._telemetry.speed, now)
+        self._unread.note_current(seq, now, frame, self.located)
 
     def note_reached(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_ITEM_REACHED, until the vehicle is located."""
-        if len(self._unread) < _MAX_UNREAD and all(seq != each.seq for each in self._unread):
-            known = self._telemetry.has_position
-            self._unread.append(
-                UnreadReached(seq, now, frame, self._telemetry.position if known else None))
+        self._unread.note_reached(seq, now, frame)
+
+    def _credit(self, passed: tuple[Item, ...], now: float) -> None:
+        """Credit items that are known to be flown."""
+        if passed:
+            self._flown, self._reached = self._flown + passed, self._reached + passed
+            self._until = now + MAX_AGE
 
     def _credit_unread(self, held: tuple[Item, ...], now: float) -> None:
         """Credit each REACHED received before the mission was read, by the positions."""
-        reached = tuple(held[each.seq] for each in self._unread if self._is_of(each, held))
-        self._unread.clear()
-        if reached:
-            self._flown += reached
-            self._reached += reached
-            self._until = now + MAX_AGE
-
-    def _is_of(self, reached: UnreadReached, held: tuple[Item, ...]) -> bool:
-        """Whether a REACHED can be of the mission on board, by the current item and the place."""
-        if not reached.may_be_of(held, self._profile.atomic):
-            return False
-        item = with_position(held[reached.seq], self._origin)
-        if reached.seq == reached.current_after:  # the last one, which may be still ahead
-            return item.position is not None and self._progress.path.visited_at(
-                item.position, item.radius, -math.inf) is not None
-        return self._was_near(item, reached)
-
-    def _was_near(self, item: Item, reached: UnreadReached) -> bool:
-        """Whether an item is near the place of a REACHED, or any position received so far."""
-        if item.position is None:
-            return False
-        if reached.place is None:
-            return self._progress.path.visited_at(
-                item.position, item.radius + LOOSE_RADIUS, -math.inf) is not None
-        return math.dist(item.position, reached.place) <= (
-            item.radius + LOOSE_RADIUS + reached.flown_since)
+        self._credit(tuple(
+            held[each.seq] for each in self._unread.take_reached(self._placed(held))), now)
 
     def awaits_position(self, held: tuple[Item, ...], read_at: float, now: float) -> bool:
         """Whether what locates the vehicle is still to come; on the ground nothing is needed.
@@ -189,14 +158,11 @@ class Resume:
         replaced = self._find_upload(held)
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
-            passed, self._until = held[recorded:recorded + 1], now + MAX_AGE
-            self._flown, self._reached = self._flown + passed, self._reached + passed
+            self._credit(held[recorded:recorded + 1], now)
         if self.current_unreliable or (self.was_disarmed and not telemetry.airborne) or (
                 not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION
                 and (replaced or not self._continues_recorded(held))):
-            self._credit_unread(held, now)
-            self._progress.begin(held, None, now)  # the current item may be of the old mission
-            self._epoch, self._located_at = self._progress.epoch, 0
+            self._begin_nowhere(held, now)
             return
         # not by REACHED: PX4 repeats that of the previous mission for some seconds
         current = min(max(0, telemetry.current - self._profile.rules.home_first), len(held))
@@ -208,7 +174,8 @@ class Resume:
             return
         self._credit_unread(held, now)
         flown = len(held) if ended else current
-        first = min(self._currents[0][0], flown) if self._currents else flown
+        currents = self._unread.currents
+        first = min(currents[0].seq, flown) if currents else flown
         self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
         items = held[:flown] + self._tasks.tagged(held[flown:], tasks)
         self._progress.begin(items, flown, now, read=True)
@@ -223,15 +190,24 @@ class Resume:
     def _begin(self, held: tuple[Item, ...], now: float) -> None:
         """Credit what the previous run has seen passed and had still to judge."""
         self.located, self._missions = True, (*self._missions[-_MAX_MISSIONS:], held)
+        before = self._unread.take_passed_before(self._placed(held), self._home_of(held))
+        self._credit(tuple(held[n] for n in sorted(before)), now)
         if len(self.passed) < 3 or self.recorded[0] != checksum(held):
             return
-        first, end, left, *seen = self.passed
+        first, end, left, *known = self.passed
         left &= 1 if self._telemetry.mode is ModeFunction.MISSION else 3
         flown = flown_in_gap(self._placed(held), first, min(end, len(held)), self._seen[:2],
-                             bool(left), self._home_of(held)).union(seen)
-        passed = tuple(held[n] for n in sorted(flown) if n < len(held))
-        self._flown, self._reached = self._flown + passed, self._reached + passed
-        self._until = now + MAX_AGE if passed else self._until
+                             bool(left), self._home_of(held)).union(known)
+        self._credit(tuple(held[n] for n in sorted(flown) if n < len(held)), now)
+
+    def _begin_nowhere(self, held: tuple[Item, ...], now: float) -> None:
+        """Begin a mission whose current item may be that of the mission before it."""
+        self._credit_unread(held, now)
+        if not self.current_unreliable:
+            passed = self._unread.passed(self._placed(held), self._home_of(held))
+            self._credit(tuple(held[n] for n in sorted(passed)), now)
+        self._progress.begin(held, None, now)
+        self._epoch, self._located_at = self._progress.epoch, 0
 
     def _placed(self, held: tuple[Item, ...]) -> tuple[Item, ...]:
         return tuple(with_position(item, self._origin) for item in held)
@@ -254,14 +230,15 @@ class Resume:
         mission, recorded, _ = self.recorded
         return (mission == checksum(held) and recorded is not None and not self._rebooted
                 and self._progress.positions.continues_recorded
-                and bool(self._currents) and recorded <= self._currents[0][0])
+                and bool(self._unread.currents) and recorded <= self._unread.currents[0].seq)
 
     def _continue_recorded(self, held: tuple[Item, ...], tasks: TaskList, ended: bool,
                            now: float) -> None:
         """Continue the previous run: items passed since are judged by the positions."""
         _, recorded, arrived = self.recorded
         assert recorded is not None
-        progress, (current, when, _) = self._progress, self._currents[0]
+        progress, first = self._progress, self._unread.currents[0]
+        current, when = first.seq, first.at
         if ended:
             current, when = len(held), now
         self._old, self._until = held[:recorded], now + MAX_AGE
@@ -279,19 +256,18 @@ class Resume:
 
     def _flown_since(self, held: tuple[Item, ...], begin: int, end: int, now: float) -> set[int]:
         """Indices in [begin, end) at which the vehicle was until steady time `now` [s]."""
-        if begin == end or len(self._currents) == 0:
+        if begin == end or not self._unread.currents:
             return set()
-        frame = max(frame for _, when, frame in self._currents if when <= now)
+        frame = max(each.frame for each in self._unread.currents if each.at <= now)
         return flown_between(self._placed(held), begin, end, now, frame,
                              self._progress.positions, self._home_of(held))
 
     def _replay(self, held: tuple[Item, ...]) -> None:
         """Pass on what was received until the mission was read, in the order it was sent."""
         rows: list[tuple[int, int, int, float]] = [
-            (frame, 1, seq, when) for seq, when, frame in self._currents[1:]]
-        rows += [(each.frame, 0, each.seq, each.at) for each in self._unread
-                 if self._is_of(each, held)]
-        self._unread.clear()
+            (each.frame, 1, each.seq, each.at) for each in self._unread.currents[1:]]
+        rows += [(each.frame, 0, each.seq, each.at)
+                 for each in self._unread.take_reached(self._placed(held))]
         for frame, kind, seq, when in sorted(rows):
             if kind:
                 self._progress.note_current(seq, when, True, frame)

@@ -69,7 +69,11 @@ class PositionHistory:
         self.path.add(sample)
 
     def add_recorded(self, sample: PositionSample) -> None:
-        """Add the last position that the previous run of the bridge has received."""
+        """Add the last position that the previous run of the bridge has received.
+
+        Args:
+            sample: position, velocity and vehicle time.
+        """
         self.path.add(sample)
         self._recorded_at = sample.t
 
@@ -172,13 +176,25 @@ class PositionHistory:
         return math.isinf(distance) or distance <= item.radius + _REACH
 
     def distance(self, item: Item) -> float:
-        """Distance [m] from an item to the newest position; inf where either is unknown."""
+        """Return the distance from an item to the newest position.
+
+        Args:
+            item: of the mission.
+
+        Returns:
+            Metres; inf where either position is unknown.
+        """
         if item.position is None or self.place is None:
             return math.inf
         return math.dist(item.position, self.place[0])
 
     def at_once(self, first: int | None, second: int | None) -> bool:
-        """Whether two frames were sent within _AT_ONCE, by their order among the positions."""
+        """Whether two frames were sent within _AT_ONCE, by their order among the positions.
+
+        Args:
+            first: number of the one; None: not known.
+            second: number of the other; None: not known.
+        """
         if second is None or first is None:
             return False
         if not any(f <= first for f, _ in self._stamps):

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The reports of a vehicle received before the mission on board was read."""
+from __future__ import annotations
+
+import math
+from copy import deepcopy
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+from uav_task_alloc.mavlink.autopilots import ModeFunction
+from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.mission.items import Item
+from uav_task_alloc.mavlink.mission.passed_items import flown_between
+from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, PositionHistory
+from uav_task_alloc.model import Point
+
+_MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
+_MAX_REACHED = 32  # REACHED kept until then
+_PLACE_DELAY = 2.0  # [s] after a REACHED in which a position still shows its place
+
+
+class UnreadCurrent(NamedTuple):
+    """A MISSION_CURRENT that was received before the mission was read."""
+
+    seq: int  # index without home
+    at: float  # [s] received
+    frame: int  # its number
+    flying: bool  # in mission mode, so that it is of the mission that is flown
+
+
+@dataclass(slots=True)
+class UnreadReached:
+    """A REACHED that was received before the mission was read."""
+
+    seq: int  # index without home
+    at: float  # [s] received
+    frame: int  # its number
+    place: Point | None  # [m] ENU of the vehicle; None: not known
+    current_after: int | None = None  # the largest current item reported since
+    flown_since: float = 0.0  # [m] that it may have flown from the item to `place`
+
+    def place_later(self, place: Point, speed: float, now: float) -> None:
+        """Take a position that came after the REACHED, as none had come before.
+
+        Args:
+            place: of the vehicle [m] ENU.
+            speed: of the vehicle [m/s]; NaN: not known.
+            now: steady time [s].
+        """
+        self.place = place
+        self.flown_since = 0.0 if math.isnan(speed) else speed * (now - self.at)
+
+    def may_be_of(self, held: tuple[Item, ...], repeats: bool) -> bool:
+        """Whether the current item was past it then; a repetition of another mission may not.
+
+        Args:
+            held: the items on board, without home.
+            repeats: REACHED is repeated (PX4), so that a current item has to show it.
+        """
+        after, last = self.current_after, len(held) - 1
+        if after is None:
+            return self.seq <= last and not repeats
+        return self.seq <= last and (after > self.seq or self.seq == after == last)
+
+
+class UnreadReports:
+    """Keeps what is received of a mission until it is read, also over a restart of the vehicle.
+
+    Args:
+        telemetry: of the vehicle.
+        positions: of the vehicle.
+        repeats: it repeats a REACHED of the mission before (PX4).
+    """
+
+    def __init__(self, telemetry: Telemetry, positions: PositionHistory, repeats: bool) -> None:
+        self._telemetry, self._positions, self._repeats = telemetry, positions, repeats
+        self.currents: list[UnreadCurrent] = []
+        self._reached: list[UnreadReached] = []
+        # of before a restart of the vehicle, whose clock starts again
+        self._before: tuple[list[UnreadCurrent], PositionHistory] | None = None
+
+    def note_current(self, seq: int, now: float, frame: int, located: bool) -> None:
+        """Take a MISSION_CURRENT.
+
+        Args:
+            seq: index without home.
+            now: steady time [s].
+            frame: its number.
+            located: whether the vehicle is located, so that it needs not be kept.
+        """
+        if not located and len(self.currents) < _MAX_CURRENTS:
+            self.currents.append(UnreadCurrent(
+                seq, now, frame, self._telemetry.mode is ModeFunction.MISSION))
+        for reached in self._reached:
+            if frame > reached.frame:
+                reached.current_after = max(seq, reached.current_after or 0)
+            if reached.place is None and self._telemetry.has_position and (
+                    now - reached.at < _PLACE_DELAY):
+                reached.place_later(self._telemetry.position, self._telemetry.speed, now)
+
+    def note_reached(self, seq: int, now: float, frame: int) -> None:
+        """Take a MISSION_ITEM_REACHED.
+
+        Args:
+            seq: index without home.
+            now: steady time [s].
+            frame: its number.
+        """
+        if len(self._reached) < _MAX_REACHED and all(seq != each.seq for each in self._reached):
+            known = self._telemetry.has_position
+            self._reached.append(
+                UnreadReached(seq, now, frame, self._telemetry.position if known else None))
+
+    def restarted(self) -> None:
+        """Keep what was received before a restart of the vehicle, with the positions of then."""
+        if self.currents:
+            self._before = self.currents, deepcopy(self._positions)
+            self.currents = []
+
+    def take_reached(self, held: tuple[Item, ...]) -> list[UnreadReached]:
+        """Take each REACHED that can be of the mission on board, and drop all.
+
+        Args:
+            held: the items on board, with their positions, without home.
+
+        Returns:
+            Those of the mission on board.
+        """
+        reached = [each for each in self._reached if self._is_of(each, held)]
+        self._reached.clear()
+        return reached
+
+    def passed(self, held: tuple[Item, ...], home: Point | None) -> set[int]:
+        """Return the items that it was seen to pass in mission mode.
+
+        Args:
+            held: the items on board, with their positions, without home.
+            home: [m] ENU, where it returns to after the last item; None: it does not, or not
+                known.
+
+        Returns:
+            Indices of those that the positions show to be flown.
+        """
+        return _passed(self.currents, self._positions, held, home)
+
+    def take_passed_before(self, held: tuple[Item, ...], home: Point | None) -> set[int]:
+        """Take the items that it was seen to pass before it was restarted.
+
+        Args:
+            held: see `passed`.
+            home: see `passed`.
+
+        Returns:
+            Indices of those that were flown.
+        """
+        before, self._before = self._before, None
+        return set() if before is None else _passed(*before, held, home)
+
+    def _is_of(self, reached: UnreadReached, held: tuple[Item, ...]) -> bool:
+        """Whether a REACHED can be of the mission on board, by the current item and the place."""
+        if not reached.may_be_of(held, self._repeats):
+            return False
+        item = held[reached.seq]
+        if reached.seq == reached.current_after:  # the last one, which may be still ahead
+            return item.position is not None and self._positions.path.visited_at(
+                item.position, item.radius, -math.inf) is not None
+        return self._was_near(item, reached)
+
+    def _was_near(self, item: Item, reached: UnreadReached) -> bool:
+        """Whether an item is near the place of a REACHED, or any position received so far."""
+        if item.position is None:
+            return False
+        if reached.place is None:
+            return self._positions.path.visited_at(
+                item.position, item.radius + LOOSE_RADIUS, -math.inf) is not None
+        return math.dist(item.position, reached.place) <= (
+            item.radius + LOOSE_RADIUS + reached.flown_since)
+
+
+def _passed(currents: list[UnreadCurrent], positions: PositionHistory, held: tuple[Item, ...],
+            home: Point | None) -> set[int]:
+    flying, passed = [each for each in currents if each.flying], set[int]()
+    for before, then in pairwise(flying):  # it falls at a restart that is not noticed yet
+        if before.seq < then.seq <= len(held):
+            passed |= flown_between(
+                held, before.seq, then.seq, then.at, then.frame, positions, home)
+    return passed
