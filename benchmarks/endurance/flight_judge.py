@@ -66,6 +66,7 @@ class Judge:
         self._commanded_arm, self._taken_by_arm = -math.inf, False
         self._armed_at, self._shown_armed = -math.inf, False  # [s]; by a delivered frame since
         self._taken_by_disarm = self._news = False  # a heartbeat since it was taken was delivered
+        self._taken_by_mode = -math.inf  # [s]
         self._events = 0
         self._forgot = False  # the bridge, until its first heartbeat
         self._set_at = -math.inf  # [s] another station has set the current item
@@ -140,6 +141,8 @@ class Judge:
             before, self._mode_at = self._shown, event.t
             if event.cause not in (OURS, 'self'):
                 self._mode_set(before, event)
+                if event.mode == self._shown and self.taken_at == self._taken_by_mode == event.t:
+                    self._mode_undone()
             elif event.cause == OURS and self.known_at is None:
                 self.taken_at = None  # a command sent before has arrived after it
         elif event.name == 'kill_switch' or (
@@ -202,7 +205,14 @@ class Judge:
         elif (new is not ModeClass.HOLD or was is ModeClass.MISSION) and (
                 event.t - self._commanded.get(event.mode, -math.inf) > SAME) and (
                 event.cause != 'failsafe' or airborne or self.world.vehicle.flight.armed):
+            self._taken_by_mode = event.t if self.taken_at is None else self._taken_by_mode
             self._take(event.t)
+
+    def _mode_undone(self) -> None:
+        """The mode by which it was taken ended within the tick: what remains is a disarming."""
+        self._taken_by_disarm = not self.world.vehicle.flight.armed
+        if not self._taken_by_disarm:
+            self.taken_at = None
 
     def _take(self, when: float) -> None:
         if self.world.vehicle.flight.system_status < d.MAV_STATE_STANDBY:

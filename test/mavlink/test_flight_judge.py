@@ -18,6 +18,7 @@ from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.sim.config import FlightMode, TruthEvent
+from uav_task_alloc.sim.modes import px4_mode
 
 PLACE, AWAY = (100.0, 0.0, 50.0), (160.0, 0.0, 50.0)
 REACHED_AT = 10.0  # [s]
@@ -149,29 +150,52 @@ def arm_command():
         1, 1, d.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
 
 
-@pytest.mark.parametrize(('shown', 'overridden'), [
-    (None, False), (heartbeat(True), True),
-    (d.MAVLink_command_ack_message(d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_RESULT_ACCEPTED), True)])
-def test_a_disarming_is_no_news_where_no_frame_has_shown_it_armed(shown, overridden):
+def judged(rows):
+    """The faults of a PX4 on the ground; rows: time, (event, cause, mode)s, frame, command."""
     flight = SimpleNamespace(
         body=SimpleNamespace(position=AWAY, velocity=(0.0, 0.0, 0.0)), custom_mode=0, seq=0,
-        booted=0.0, mode=FlightMode.HOLD, items=[], landed=True, track=None,
+        booted=0.0, mode=FlightMode.HOLD, items=[], landed=True, track=None, armed=False,
         system_status=d.MAV_STATE_STANDBY)
     world = SimpleNamespace(now=0.0, vehicle=SimpleNamespace(flight=flight), events=[],
                             tasks=None, state=None, authority=AuthorityState.UNKNOWN)
     judge = Judge(world, 'px4', {})
-    for now, event, frame, sent in (
-            (1.0, ('armed', OURS), shown, None), (1.1, ('disarmed', 'pilot'), None, None),
-            (2.0, None, heartbeat(False), None), (2.1, None, None, arm_command()),
-            (2.2, ('armed', OURS), None, None), (3.0, None, heartbeat(True), None),
-            (3.1, None, None, arm_command())):
+    for now, events, frame, sent in rows:
         world.now = now
-        world.truth = [TruthEvent(now, event[0], AWAY, cause=event[1])] if event else []
+        world.truth = [TruthEvent(now, name, AWAY, mode=mode, cause=cause)
+                       for name, cause, mode in events]
+        for name, _, _ in events:
+            flight.armed = {'armed': True, 'disarmed': False}.get(name, flight.armed)
         world.delivered = [(now, frame)] if frame else []
         world.arrivals = [now] if frame and frame.get_type() == 'HEARTBEAT' else []
         world.sent = [(now, sent)] if sent else []
         judge.step()
-    assert bool(judge.counts['overridden']) is overridden
+    return judge.counts
+
+
+BY_LAND = [('mode', 'pilot', px4_mode(4, 6)), ('disarmed', 'pilot', None), ('mode', 'pilot', 0)]
+
+
+@pytest.mark.parametrize('disarmed', [[('disarmed', 'pilot', None)], BY_LAND])
+@pytest.mark.parametrize(('shown', 'overridden'), [
+    (None, False), (heartbeat(True), True),
+    (d.MAVLink_command_ack_message(d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_RESULT_ACCEPTED), True)])
+def test_a_disarming_is_no_news_where_no_frame_has_shown_it_armed(shown, overridden, disarmed):
+    counts = judged([
+        (1.0, [('armed', OURS, None)], shown, None), (1.1, disarmed, None, None),
+        (2.0, [], heartbeat(False), None), (2.1, [], None, arm_command()),
+        (2.2, [('armed', OURS, None)], None, None), (3.0, [], heartbeat(True), None),
+        (3.1, [], None, arm_command())])
+    assert bool(counts['overridden']) is overridden
+
+
+@pytest.mark.parametrize(('seconds', 'overridden'), [(0.0, False), (0.3, True)])
+def test_a_mode_that_ends_before_a_frame_can_show_it_is_no_news(seconds, overridden):
+    counts = judged([
+        (1.0, [('armed', OURS, None)], heartbeat(True), None),
+        (1.5, BY_LAND[:1], None, None) if seconds else (1.5, [], None, None),
+        (1.5 + seconds, [*([] if seconds else BY_LAND[:1]), BY_LAND[2]], None, None),
+        (2.0, [], heartbeat(True), None), (2.1, [], None, arm_command())])
+    assert bool(counts['overridden']) is overridden
 
 
 def fly_random(monkeypatch, number, break_bridge):
