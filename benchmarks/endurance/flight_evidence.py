@@ -47,7 +47,9 @@ class DeliveredEvidence:
     """Follows each first visit of a task until a frame that shows it was delivered.
 
     Evidence is MISSION_ITEM_REACHED of that visit, MISSION_CURRENT past its item (or COMPLETE) of
-    the same items, or positions at the place while its item was current, for its service time.
+    the same items, or positions at the place while its item was current, for its service time,
+    and a frame sent after them that shows mission mode: without one a pilot may have taken the
+    vehicle just before it was there.
     A MISSION_CURRENT sent after another station has set the current item is none: it would be the
     same if the item had been skipped just before it was reached.
     """
@@ -59,6 +61,7 @@ class DeliveredEvidence:
         self._visits: dict[str, _Visit] = {}
         self._states: dict[int, _State] = {}  # by tick
         self._positions: list[float] = []  # [s] when each delivered position was sent
+        self._shown = -math.inf  # [s] the latest delivered frame that shows mission mode was sent
 
     def add_state(self, now: float, flight: VehicleFlight) -> None:
         """Record the vehicle as the frames of this tick show it."""
@@ -113,7 +116,11 @@ class DeliveredEvidence:
             sent: when it was sent [s].
             message: its content.
         """
-        kind = message.get_type()
+        kind, state = message.get_type(), self._states.get(_tick(sent))
+        if kind in ('HEARTBEAT', 'MISSION_CURRENT') and state is not None and (
+                state.seq is not None and sent > self._shown):
+            self._shown = sent
+            self._judge_positions()
         if kind == 'GLOBAL_POSITION_INT' and (message.lat, message.lon) != (0, 0):
             self._positions = [t for t in self._positions if t > sent - KEPT] + [sent]
             self._judge_positions()
@@ -140,14 +147,18 @@ class DeliveredEvidence:
         for task, visit in self._visits.items():
             if task in self.known:
                 continue
-            times = [t for t in self._positions if t <= visit.at + TICK and self._at(visit, t)]
+            times = [t for t in self._positions
+                     if t <= min(visit.at + TICK, self._shown) and self._at(visit, t)]
             if times and max(times) - min(times) >= visit.hold - SAMPLED:
                 self.known[task] = self._now
 
     def _at(self, visit: _Visit, sent: float) -> bool:
-        """Whether a position was sent at the place while its item was current."""
+        """Whether a position was sent at the place while its item was current.
+
+        Once the mission has ended (PX4 holds then, as it does for a pilot), none is any more.
+        """
         state = self._states.get(_tick(sent))
-        return state is not None and (
+        return state is not None and state.seq is not None and (
             state.seq == visit.seq or sent >= visit.at) and (
             state.booted == visit.state.booted
             and state.items[visit.seq:visit.seq + 1] == visit.state.items[

@@ -27,8 +27,8 @@ REACHED_AT = 10.0  # [s]
 class Visit:
     """One vehicle that reaches item 2 at PLACE at REACHED_AT, and flies on."""
 
-    def __init__(self, hold=0.0):
-        self.evidence, self.hold = DeliveredEvidence(), hold
+    def __init__(self, hold=0.0, ends=False):
+        self.evidence, self.hold, self.ends = DeliveredEvidence(), hold, ends
         self.flight = SimpleNamespace(body=SimpleNamespace(position=AWAY), seq=2, booted=0.0,
                                       mode=FlightMode.MISSION, items=['home', 'A', 'B', 'C'])
 
@@ -40,6 +40,7 @@ class Visit:
             self.flight.body.position = PLACE if there else AWAY
             if abs(now - REACHED_AT) < 0.05:
                 self.flight.seq = 3
+                self.flight.mode = FlightMode.HOLD if self.ends else FlightMode.MISSION
             self.evidence.add_state(now, self.flight)
             if self.flight.seq == 3 and abs(now - REACHED_AT) < 0.05:
                 self.evidence.reached('B', REACHED_AT, 2, PLACE, self.hold, now)
@@ -48,6 +49,12 @@ class Visit:
 
 def current(seq, state=d.MISSION_STATE_ACTIVE):
     return d.MAVLink_mission_current_message(seq, 3, state, 1)
+
+
+def heartbeat(armed):
+    return d.MAVLink_heartbeat_message(
+        d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, d.MAV_MODE_FLAG_SAFETY_ARMED * armed, 0,
+        d.MAV_STATE_STANDBY, 3)
 
 
 def position():
@@ -64,9 +71,6 @@ def position():
     (10.1, current(2), False),
     (10.1, current(2, d.MISSION_STATE_COMPLETE), True),
     (9.0, current(3), False),  # before it was reached
-    (10.0, position(), True),
-    (9.0, position(), False),  # not there yet
-    (12.0, position(), False),  # on its way to the next item
 ])
 def test_a_frame_is_evidence_where_it_shows_that_the_item_was_reached(sent, message, known):
     evidence = Visit().fly()
@@ -84,11 +88,34 @@ def test_a_current_item_that_another_station_has_set_is_no_evidence(sent, known)
     assert 'B' in evidence.known
 
 
+@pytest.mark.parametrize(('sent', 'mode_sent', 'known'), [
+    (10.0, 10.1, True),
+    (10.0, 9.9, False),  # a pilot may have taken it in between
+    (9.0, 10.1, False),  # not there yet
+    (12.0, 12.1, False),  # on its way to the next item
+])
+def test_a_position_is_evidence_where_a_frame_after_it_shows_mission_mode(sent, mode_sent, known):
+    evidence = Visit().fly()
+    for when, message in sorted(((sent, position()), (mode_sent, heartbeat(True))),
+                                key=lambda row: row[0]):
+        evidence.delivered(when, message)
+    assert ('B' in evidence.known) is known
+
+
 @pytest.mark.parametrize(('first', 'known'), [(8.0, True), (9.2, False)])
 def test_positions_are_evidence_once_they_span_the_service_time(first, known):
     evidence = Visit(hold=2.0).fly()
     for sent in (first, 9.9):
         evidence.delivered(sent, position())
+    evidence.delivered(9.9, heartbeat(True))
+    assert ('B' in evidence.known) is known
+
+
+@pytest.mark.parametrize(('ends', 'known'), [(False, True), (True, False)])
+def test_a_position_after_the_mission_has_ended_is_no_evidence(ends, known):
+    evidence = Visit(ends=ends).fly()
+    evidence.delivered(REACHED_AT, position())
+    evidence.delivered(REACHED_AT + 0.1, heartbeat(True))
     assert ('B' in evidence.known) is known
 
 
@@ -137,12 +164,6 @@ def test_a_reached_of_the_next_item_at_that_index_is_no_evidence():
     assert 'B' not in evidence.known
     evidence.delivered(14.9, d.MAVLink_mission_item_reached_message(2))
     assert 'B' in evidence.known
-
-
-def heartbeat(armed):
-    return d.MAVLink_heartbeat_message(
-        d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, d.MAV_MODE_FLAG_SAFETY_ARMED * armed, 0,
-        d.MAV_STATE_STANDBY, 3)
 
 
 def arm_command():

@@ -111,20 +111,38 @@ def test_an_end_reported_just_before_a_reboot_counts_where_it_comes_after_it(
     assert bench.completed() == completed
 
 
+@PX4
+@pytest.mark.parametrize('reported', [True, False])
+def test_an_end_reported_just_before_a_reboot_counts_where_no_reached_came(kind, reported):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: True)
+    drop_messages(bench, 'down', 'MISSION_CURRENT', lambda m: not reported and (
+        m.mission_state == d.MISSION_STATE_COMPLETE))
+    assert bench.run(lambda: places(bench) == ['A', 'B'])
+    bench.run(limit=0.8)
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=4.0)
+    assert bench.completed() == ['A', 'B'][:1 + reported]
+
+
 def test_a_vehicle_without_a_position_has_the_usual_speed():
     assert FlownPath().fastest == 15.0
 
 
 @pytest.mark.parametrize('back', [False, True])
-@pytest.mark.parametrize(('after', 'completed'), [(0.0, ['B']), (0.4, [])])
+@pytest.mark.parametrize(('after', 'shown', 'completed'), [
+    (0.0, True, ['B']), (0.4, True, []), (0.0, False, [])])
 def test_a_mode_and_a_current_item_of_a_restart_do_not_hide_the_place_of_before(
-        after, completed, back):
+        after, shown, completed, back):
     flight = Flight()
     flight.begin(A=50.0, B=100.0, C=500.0)
     flight.table.note_set_current(1, flight.now)
     flight.table.note_in_mission()
     flight.table.note_current(1, flight.now, True, flight.frame())
     flight.fly_to(100.0)
+    if shown:  # else a pilot may have taken it just before
+        flight.table.note_in_mission(flight.frame())
     flight.table.note_mission_left(flight.now)
     if after:  # a pilot has taken it
         flight.stay(after)

@@ -208,8 +208,8 @@ class MissionExecutor:
                 self.onboard.progress.note_mission_left(now)
         if not self.telemetry.in_mission:
             self.onboard.progress.note_other_mode(now)  # as COMMAND_ACK shows
-        elif heartbeat or self.telemetry.mode is not ModeFunction.MISSION:
-            self.onboard.progress.note_in_mission()  # MISSION_CURRENT shows it too
+        elif heartbeat or self.telemetry.shows_mission:
+            self.onboard.progress.note_in_mission(self.telemetry.frame)
         out = self.onboard.receive(message, now) + self.fence.receive(message, now)
         self.sender.receive(message)
         self._end_actions.receive(message)

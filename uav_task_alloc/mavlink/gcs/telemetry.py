@@ -141,6 +141,11 @@ class Telemetry:
                 or self._in_mission_frame > self._mode_frame)
 
     @property
+    def shows_mission(self) -> bool:
+        """Whether the latest message is a MISSION_CURRENT that shows mission mode."""
+        return self._in_mission_frame == self.frame > self._mode_frame
+
+    @property
     def past_boot(self) -> bool:
         """Whether the autopilot has booted, so that its mission store is available."""
         return self.autopilot not in ESTIMATE or self._started

@@ -47,6 +47,7 @@ class CurrentItem:
         self.in_mission = False  # mission mode, by the newest heartbeat
         self._entered_at = -math.inf  # vehicle time [s] at which it was in mission mode first
         self._in_mission_at = -math.inf  # vehicle time [s] at which it was in mission mode last
+        self._shown_until = -math.inf  # vehicle time [s] until which a frame has shown that
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
         # vehicle times [s] between which it left mission mode while no position came
         self._left_unseen = math.inf, -math.inf
@@ -68,12 +69,14 @@ class CurrentItem:
         for item in self.passed.seen():
             self._tasks.complete(item.task, item.place)
         active, since = self._active_at_end(now), max(self._epoch.since, self._entered_at)
-        if active is not None and self._positions.was_at(active, since, close=0.0):
+        # after the last frame that shows mission mode a pilot may have taken it
+        if active is not None and self._positions.was_at(
+                active, since, self._shown_until, close=0.0):
             self._tasks.credit(active)
         self.reports.clear()
         self.passed.clear()
         self.set_by_other = None
-        self._left_unseen = math.inf, -math.inf
+        self._left_unseen, self._shown_until = (math.inf, -math.inf), -math.inf
 
     def _active_at_end(self, now: float) -> Item | None:
         """The item that was flown until the last position before a restart; None: not known.
@@ -108,12 +111,18 @@ class CurrentItem:
             len(claim.items) > 1 and any(item is one for one in claim.items)
             for claim in self.passed.claims)
 
-    def note_in_mission(self) -> None:
-        """Note that the vehicle is in mission mode."""
+    def note_in_mission(self, frame: int | None = None) -> None:
+        """Note that the vehicle is in mission mode.
+
+        Args:
+            frame: number of the frame that shows it; None: an earlier one does.
+        """
+        newest = self._positions.path.newest
         if not self.in_mission:
-            self._entered_at = self._positions.path.newest
-        self.in_mission = True
-        self._in_mission_at = self._positions.path.newest
+            self._entered_at = newest
+        self.in_mission, self._in_mission_at = True, newest
+        if frame is not None:
+            self._shown_until = max(self._shown_until, self._positions.sent_between(frame)[0])
 
     @property
     def left_unseen(self) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The end of a mission that PX4 has reported before a restart, in a frame that comes late."""
+"""The end of a mission that PX4 has reported just before a restart, or in a frame after it."""
 from __future__ import annotations
 
 import math
@@ -29,6 +29,7 @@ class EndBeforeRestart:
                  moves: CurrentItem) -> None:
         self._epoch, self._tasks, self._positions, self._moves = epoch, tasks, positions, moves
         self._ending: tuple[int, Item, float] | None = None  # index, item, until when [s]
+        self._ended: tuple[int, int, float] | None = None  # epoch, index, reported at [s]
 
     def note_restart(self, now: float) -> None:
         """Note that the vehicle was restarted; call before the epoch ends.
@@ -36,16 +37,26 @@ class EndBeforeRestart:
         Args:
             now: steady time [s].
         """
-        epoch, left_at, back = self._epoch, self._moves.left_at, self._moves.set_back_from
+        epoch, back = self._epoch, self._moves.set_back_from
         current = epoch.current if back is None or now - back[1] > MAX_MESSAGE_DELAY else back[0]
         item = (
             None if current is None or current >= len(epoch.items) else epoch.items[current])
-        left = self._moves.in_mission or (math.isfinite(left_at) and (
-            self._positions.path.newest - left_at < MAX_MESSAGE_DELAY))
-        at_end = item is not None and left and current == epoch.last_flown and (
+        at_end = item is not None and self._flies and current == epoch.last_flown and (
             self._positions.distance(item) <= item.radius + CLOSE)
         self._ending = None if item is None or current is None or not at_end else (
             current, item, now + MAX_MESSAGE_DELAY)
+        if self._ending is not None and self._ended is not None and item is not None and (
+                self._ended[:2] == (epoch.number, current)
+                and now - self._ended[2] < MAX_MESSAGE_DELAY):
+            self._tasks.credit(item)
+        self._ended = None
+
+    @property
+    def _flies(self) -> bool:
+        """Whether it is in mission mode, or was until a moment ago."""
+        left_at = self._moves.left_at
+        return self._moves.in_mission or (math.isfinite(left_at) and (
+            self._positions.path.newest - left_at < MAX_MESSAGE_DELAY))
 
     def note_current(self, message: Message, now: float) -> None:
         """Take a MISSION_CURRENT: a restarted vehicle has not flown its mission to the end yet.
@@ -54,7 +65,11 @@ class EndBeforeRestart:
             message: as PX4 sends it.
             now: steady time [s].
         """
-        if self._ending is None or message.mission_state != dialect.MISSION_STATE_COMPLETE:
+        if message.mission_state != dialect.MISSION_STATE_COMPLETE:
+            return
+        if self._flies and message.seq == self._epoch.last_flown:
+            self._ended = self._epoch.number, message.seq, now
+        if self._ending is None:
             return
         seq, item, deadline = self._ending
         if message.seq == seq and now < deadline:

@@ -274,9 +274,13 @@ class ProgressTable:
             epoch.started = item.task
             self._tasks.start(item.task)
 
-    def note_in_mission(self) -> None:
-        """Note that the vehicle is in mission mode, by whichever command."""
-        self._moves.note_in_mission()
+    def note_in_mission(self, frame: int | None = None) -> None:
+        """Note that the vehicle is in mission mode, by whichever command.
+
+        Args:
+            frame: number of the frame that shows it; None: an earlier one does.
+        """
+        self._moves.note_in_mission(frame)
 
     def note_other_mode(self, now: float) -> None:
         """Note that the vehicle is not in mission mode, by whichever command."""
