@@ -16,7 +16,7 @@ from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemRepor
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.flown_path import GAP
 from uav_task_alloc.mavlink.mission.item import Item, leg_count
-from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems, flown_nearby
+from uav_task_alloc.mavlink.mission.passed_items import NO_TASKS, Claim, PassedItems, flown_nearby
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import ReachedEpoch
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
@@ -225,6 +225,20 @@ class CurrentItem:
         self.skipped.extend(item.task for item in items)
         if items and claim.epoch == self._epoch.number:
             self.set_by_other = self._epoch.current
+
+    def passed_in_flight(self) -> tuple[frozenset[str], int]:
+        """Return the pending tasks passed in mission mode, and whether it has left that unseen.
+
+        Returns:
+            Their ids, and since then 0: it has not, 1: it has, 2: perhaps, as nothing has shown
+            the mode since.
+        """
+        claims = [claim for claim in self.passed.claims
+                  if claim.in_flight or self.left_unseen_since(claim)]
+        if not claims:
+            return NO_TASKS, 0
+        left = 1 if any(map(self.left_unseen_since, claims)) else 2 * self.may_have_left
+        return frozenset(item.task for claim in claims for item in claim.items), left
 
     def left_unseen_since(self, claim: Claim) -> bool:
         """Whether it may have left mission mode unseen since it passed the items of a claim."""

@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, Positi
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
 
+NO_TASKS: frozenset[str] = frozenset()
 _BLIND = 30.0  # [s] to wait for a position that shows where it is after a claim
 _FRAMES_AFTER = 10  # frames after MISSION_CURRENT in which REACHED may follow
 _COUNTED = 2.0  # [s] for which a vehicle is at an item, at most, before it goes on to the next
@@ -74,6 +75,11 @@ class PassedItems:
         """Items of open claims at which the vehicle was seen, where nothing more will come."""
         return tuple(item for claim in self.claims for item in claim.items
                      if self._visit(item, claim) is Visit.YES or self._approached(item, claim))
+
+    def in_order(self) -> frozenset[str]:
+        """Tasks of open claims that were passed one by one, as a mission is flown."""
+        return frozenset(item.task for claim in self.claims if not claim.skips
+                         for item in claim.items) if self.claims else NO_TASKS
 
     def clear(self) -> None:
         """Drop all claims: the mission on board is unknown."""

@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.mission.end_before_restart import EndBeforeRestart
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
+from uav_task_alloc.mavlink.mission.passed_items import NO_TASKS
 from uav_task_alloc.mavlink.mission.piece_coverage import PieceCoverage
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import (
@@ -29,8 +30,6 @@ from uav_task_alloc.mavlink.mission.reached_series import ReachedSeries
 from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point, Task
-
-_NONE = frozenset[str]()  # no tasks
 
 
 class ProgressTable:
@@ -143,7 +142,7 @@ class ProgressTable:
         """Tasks that may be completed: the evidence may still arrive."""
         claims, doubtful = self._moves.passed.claims, self._tasks.doubtful
         return frozenset(chain((i.task for claim in claims for i in claim.items), doubtful)) if (
-            claims or doubtful) else _NONE
+            claims or doubtful) else NO_TASKS
 
     @property
     def uncovered(self) -> deque[str]:
@@ -153,24 +152,12 @@ class ProgressTable:
     @property
     def passed_in_order(self) -> frozenset[str]:
         """The pending tasks that were passed one by one, as a mission is flown."""
-        claims = self._moves.passed.claims
-        return frozenset(item.task for claim in claims if not claim.skips
-                         for item in claim.items) if claims else _NONE
+        return self._moves.passed.in_order()
 
     @property
     def passed_in_flight(self) -> tuple[frozenset[str], int]:
-        """The pending tasks passed in mission mode, and whether it has left that unseen since.
-
-        0: no, 1: yes, 2: perhaps, as nothing has shown the mode since.
-        """
-        moves = self._moves
-        claims = moves.passed.claims and [
-            claim for claim in moves.passed.claims
-            if claim.in_flight or moves.left_unseen_since(claim)]
-        if not claims:
-            return _NONE, 0
-        left = 1 if any(map(moves.left_unseen_since, claims)) else 2 * moves.may_have_left
-        return frozenset(item.task for claim in claims for item in claim.items), left
+        """See `CurrentItem.passed_in_flight`."""
+        return self._moves.passed_in_flight()
 
     def seen_passed(self) -> frozenset[str]:
         """Return the pending tasks at which the vehicle was seen."""
