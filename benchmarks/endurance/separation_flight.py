@@ -13,6 +13,7 @@ ACCELERATION, CLIMB, DESCENT = 3.0, 2.5, 1.5  # [m/s2], [m/s], [m/s]
 SPEED = 15.0  # [m/s] as reported; each UAV flies another one
 LINK, ARMING = 0.8, 3.0  # [s] until a list or a hold is flown; from the ground to the climb
 CRUISE = 50.0  # [m] to which it climbs, the default of the bridge
+TOLERANCE, SHORTEST = 5.0, 1.0  # [s] by which a wait is off before it changes; a shorter is none
 SHARP = math.cos(math.radians(30.0))  # corners at which it stops
 
 
@@ -24,6 +25,7 @@ class Leg:
     task: str = ''  # served there; '': none
     service: float = 0.0  # [s]
     wait: float = 0.0  # [s] before the leg begins
+    begin: float = 0.0  # [s] of the service after the wait
     lands: bool = False
 
 
@@ -45,6 +47,7 @@ class Craft:
     legs: list[Leg] = field(default_factory=list)
     until: float = 0.0  # [s] it waits or serves
     serving: str = ''
+    waiting: tuple[str, float] = ('', 0.0)  # task before whose leg it waits, begin of the service
     climbing: bool = False
     airborne_for: float = 0.0  # [s]
     orders: list[tuple[float, object]] = field(default_factory=list)  # lists and holds under way
@@ -109,10 +112,11 @@ class Craft:
             stops = stops[1:]
         legs: list[Leg] = []
         for stop in stops:
-            legs += [Leg(point, wait=stop.wait if k == 0 else 0.0)
+            begin = now + stop.eta + stop.wait
+            legs += [Leg(point, wait=stop.wait if k == 0 else 0.0, begin=begin)
                      for k, point in enumerate(stop.leg.via)]
             legs.append(Leg(stop.task.position, stop.task.id, stop.task.service_time,
-                            0.0 if stop.leg.via else stop.wait))
+                            0.0 if stop.leg.via else stop.wait, begin))
         if order.returns and (legs or self.serving or not self.landed):
             last = legs[-1].point if legs else self.place
             legs += [Leg(point) for point in order.end_via]
@@ -120,12 +124,29 @@ class Craft:
             above = (*self.home[:2], max(top, self.home[2] + 5.0))
             legs += [Leg(above)] if not legs or legs[-1].point != above else []
             legs.append(Leg(self.home, lands=True))
-        if (not self.legs and not self.landed) or self.climbing:
-            self.legs = legs
+        waits = bool(self.waiting[0]) and now < self.until
+        if (not self.legs and not self.landed) or self.climbing or self.serving or waits:
+            self.legs = legs  # no leg is under way
         else:
             self.legs = self._not_passed(legs)
         if self.landed and self.legs:
             self.until = now + max(ARMING, self.legs[0].wait)
+        elif waits and not self.serving:
+            self._wait_on(now)
+
+    def _wait_on(self, now: float) -> None:
+        """A wait goes on, changes or ends with the list, as in mavlink/mission/waits.py."""
+        task, begin = self.waiting
+        first = self.legs[0] if self.legs else None
+        if first is None or task != self._next_task:
+            self.until, self.waiting = now, ('', 0.0)
+        elif abs(first.begin - begin) > TOLERANCE:
+            self._wait(now)
+
+    @property
+    def _next_task(self) -> str:
+        """The task that it flies to; '': home."""
+        return next((leg.task for leg in self.legs if leg.task), '')
 
     def _not_passed(self, legs: list[Leg]) -> list[Leg]:
         """A list for a leg under way goes on after the detour points that were passed."""
@@ -139,8 +160,9 @@ class Craft:
 
     def _wait(self, now: float) -> None:
         """Wait at a stop before the next leg begins."""
-        if self.legs and self.legs[0].wait > 1.0:
-            self.until = now + self.legs[0].wait
+        wait = self.legs[0].wait if self.legs else 0.0
+        self.until = now + (wait if wait >= SHORTEST else 0.0)
+        self.waiting = (self._next_task, self.legs[0].begin) if self.until > now else ('', 0.0)
 
     def _take_off(self, now: float) -> None:
         if self.legs and self.legs[0].task == '' and not any(leg.task for leg in self.legs):

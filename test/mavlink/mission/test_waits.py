@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Waits before tasks: holds at the stop before, later take-offs, and when they are sent again."""
+import math
 from dataclasses import replace
 
 import pytest
@@ -8,7 +9,7 @@ from mission_bench import ORIGIN, PROFILES, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink import autopilots
-from uav_task_alloc.mavlink.mission.items import Hold, alike, mission_items
+from uav_task_alloc.mavlink.mission.items import Hold, TaskList, alike, mission_items
 from uav_task_alloc.mavlink.mission.waits import Waits
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
@@ -171,3 +172,18 @@ def test_a_new_list_during_a_hold_leaves_it_and_a_later_task_prolongs_it(kind):
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 300.0)
     assert bench.now - begun >= 90.0
     assert bench.onboard().upload_started_at > uploads
+
+
+@BOTH
+@pytest.mark.parametrize('other', [
+    timed('C', 2, waits=[0.0]), TaskList(2, (), True, ((100.0, 100.0, 70.0),)),
+    TaskList(2, (), True)], ids=['another task', 'home by a point', 'home'])
+def test_a_hold_ends_where_its_task_is_taken_away(kind, other):
+    bench = FlightBench(kind).discover()
+    bench.assign(timed('AB', waits=[0.0, 600.0], begins=[0.0, 900.0]))
+    assert bench.run(lambda: bench.completed() == ['A'], 200.0)
+    bench.run(limit=10.0)
+    held = bench.vehicles[1].flight.body.position
+    assert math.dist(held, place('A')) < 5.0
+    bench.assign(other)
+    assert bench.run(lambda: math.dist(bench.vehicles[1].flight.body.position, held) > 20.0, 15.0)
