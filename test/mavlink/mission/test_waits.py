@@ -187,3 +187,23 @@ def test_a_hold_ends_where_its_task_is_taken_away(kind, other):
     assert math.dist(held, place('A')) < 5.0
     bench.assign(other)
     assert bench.run(lambda: math.dist(bench.vehicles[1].flight.body.position, held) > 20.0, 15.0)
+
+
+@BOTH
+@pytest.mark.parametrize(('names', 'height'), [('BD', None), ('BDC', None), ('BCD', None),
+                                               ('BD', 70.0)])
+def test_a_hold_in_which_the_list_changes_ends_when_it_was_to_end(kind, names, height):
+    bench = FlightBench(kind).discover()
+    bench.assign(timed('ABD', waits=[0.0, 40.0], begins=[0.0, 900.0]))
+    assert bench.run(lambda: bench.completed() == ['A'], 200.0)
+    begun = bench.now
+    bench.run(limit=30.0)
+    x, y, z = bench.vehicles[1].flight.body.position
+    changed = timed(names, 2, waits=[10.0], begins=[900.0])
+    if height is not None:
+        first = replace(changed.stops[0], via=((x + 10.0, y, height),))
+        changed = replace(changed, stops=(first, *changed.stops[1:]))
+    bench.assign(changed)
+    assert bench.run(lambda: math.dist(bench.vehicles[1].flight.body.position, (x, y, z)) > 5.0,
+                     100.0)
+    assert 40.0 <= bench.now - begun <= 47.0

@@ -4,7 +4,8 @@
 A wait is a hold at the stop before: one more item there, which belongs to the leg to the task. On
 the ground the take-off is later instead. A vehicle that is already on the leg holds at the task.
 Items hold for a number of seconds, while plans mean times; so a wait that has become an item stays
-as it is until it is more than WAIT_TOLERANCE off.
+as it is until it is more than WAIT_TOLERANCE off. A hold that runs begins again with each upload:
+where the rest of the list changes, it becomes what is left of the wait.
 """
 from __future__ import annotations
 
@@ -40,6 +41,7 @@ class Waits:
         self.version = 0  # of the holds
         self.take_off: tuple[float, float, str] | None = None  # from, until [ROS s]; the task
         self._waits: dict[str, _Wait] = {}  # by task id
+        self._tasks = TaskList(0)
 
     def assign(self, tasks: TaskList, done: Container[str], airborne: bool,
                active: Item | None) -> None:
@@ -62,6 +64,9 @@ class Waits:
             else:
                 waits[stop.task.id] = self._wait(stop, last, active)
             last = stop.end
+        if airborne:
+            self._shorten(waits, tasks, active)
+        self._tasks = tasks
         if waits != self._waits:
             self._waits, self.version = waits, self.version + 1
 
@@ -82,6 +87,21 @@ class Waits:
             return old
         hold = Hold(place, stop.wait) if stop.wait >= SHORTEST else None
         return _Wait(hold, stop.wait, stop.begin)
+
+    def _shorten(self, waits: dict[str, _Wait], tasks: TaskList, active: Item | None) -> None:
+        """Give a hold that runs what is left of its wait, where the list is uploaded anyway."""
+        first = next(iter(waits), '')
+        old = self._waits.get(first)
+        if not first or waits[first] is not old or old.hold is None or active is None or (
+                active.task != first or not active.holds):
+            return
+        held = {name: wait.hold for name, wait in waits.items() if wait.hold}
+        known = {name: wait.hold for name, wait in self._waits.items()
+                 if wait.hold and name in waits}
+        if held != known or _route(tasks, first) != _route(self._tasks, first):
+            stop = next(stop for stop in tasks.stops if stop.task.id == first)
+            left = replace(old.hold, seconds=stop.wait) if stop.wait >= SHORTEST else None
+            waits[first] = _Wait(left, stop.wait, stop.begin)
 
     def note_active(self, tasks: TaskList, active: Item | None) -> None:
         """End the wait before the first of the remaining tasks once the vehicle is past it."""
@@ -109,6 +129,14 @@ class Waits:
         # a clock that went back says nothing about the departure
         waits = since - WAIT_TOLERANCE <= clock < until and math.isfinite(until)
         return f'its departure: task {task} begins later' if waits else ''
+
+
+def _route(tasks: TaskList, first: str) -> tuple[object, ...]:
+    """What is flown from a task on, without the waits."""
+    stops = list(tasks.stops)
+    while stops and stops[0].task.id != first:
+        del stops[0]
+    return [(stop.task, stop.via, stop.reversed) for stop in stops], tasks.returns, tasks.end_via
 
 
 def _is_flown(active: Item | None, stop: MissionStop) -> bool:
