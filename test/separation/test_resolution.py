@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Resolution: head-on, crossing, overtaking, converging, and ten UAVs of one base."""
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -196,6 +197,27 @@ def test_a_wait_of_an_earlier_plan_ends_when_less_is_enough(other):
     assert after.left == []
     held = after.flights[-1].legs[1].hold_until
     assert (30.0 < held < 87.0) if other else held == -math.inf
+
+
+@pytest.mark.parametrize('other', [True, False])
+def test_a_return_at_the_height_of_an_earlier_plan_comes_down_when_the_way_is_free(other):
+    a = flight('a', (0, 250, 30), (FAR, 250, 30), begin=10.0, service=60.0)
+    b = returning('b', 200.0, (200.0, 500.0, 0.0))
+    home = b.legs[-1]
+    x, y, _ = home.points[0]
+    high = replace(home, points=((x, y, 30.0), (x, y + 100.0, 70.0), (x, 500.0, 70.0),
+                                 home.points[-1]))
+    b = replace(b, legs=(*b.legs[:-1], high))
+    assert not find_conflicts(flight_volumes((a, b), RULE), RULE)
+    after = resolve((a, b) if other else (b,), RULE)
+    assert after.left == []
+    top = max(point[2] for point in after.flights[-1].legs[-1].points)
+    assert top == (35.5 if other else 30.0)
+    # a height that costs little stays
+    small = replace(home, points=((x, y, 30.0), (x, y + 100.0, 31.0), (x, 500.0, 31.0),
+                                  home.points[-1]))
+    kept = replace(b, legs=(*b.legs[:-1], small))
+    assert resolve((kept,), RULE).flights[0].legs[-1].points == small.points
 
 
 def test_a_take_off_ends_at_its_own_height_and_the_leg_goes_on_from_there():

@@ -19,6 +19,7 @@ from uav_task_alloc.separation.conflicts import (
     find_conflicts,
 )
 from uav_task_alloc.separation.rule import Conflict, Separation
+from uav_task_alloc.separation.transit_paths import slanted, upright
 from uav_task_alloc.separation.volumes import (
     Flight,
     FlightLeg,
@@ -43,7 +44,6 @@ _LEAST_SAVED = 3.0  # [s] of a wait; for less it stays as it is
 _SOONER = (0.0, 0.25, 0.5, 0.75)  # of a wait of an earlier plan
 _GROUND = 0.5  # price of a second of waiting on the ground
 _ON_LINE = 0.01  # [m] a detour point so near to the line of its neighbours only changes the height
-_STEEP = 0.45  # share of the first and last straight part that a slanted climb may take
 LegIndex = tuple[int, int]  # of a flight, and of its leg
 
 
@@ -96,12 +96,13 @@ def resolve(flights: Sequence[Flight], rule: Separation,
     """
     volumes = flight_volumes(flights, rule)
     found = find_conflicts(volumes, rule)
-    waits = {k for k, flight in enumerate(flights) for leg in flight.legs
-             if leg.movable and leg.hold_until > -math.inf}
-    if not found and not waits:
+    # by earlier plans, for which there may be no need any more
+    changed = {k for k, flight in enumerate(flights) for leg in flight.legs
+               if leg.movable and (leg.hold_until > -math.inf or _returns_higher(leg))}
+    if not found and not changed:
         return Resolution(tuple(flights))
     planner = _Planner(flights, rule, limits or TransitLimits())
-    involved = waits | {k for each in found for k in each.flights}
+    involved = changed | {k for each in found for k in each.flights}
     for k in range(len(flights)):
         planner.accept_fixed(k, whole=k not in involved)
     # in the air first: those on the ground can wait there
@@ -201,7 +202,7 @@ class _Planner:
         paths = sorted((_Change(leg, 0.0, '', ''), *self._heights(flight, leg)),
                        key=lambda each: each.seconds)
         waits = _TAKE_OFFS if leg.takes_off else _HOLDS
-        if not leg.may_wait or (n == 0 and flight.in_air):
+        if not leg.may_wait or (n == 0 and flight.in_air and not flight.waits):
             waits = ()
         price = _GROUND if leg.takes_off else 1.0
         options = [(path.seconds + price * wait, wait, number) for number, path in enumerate(paths)
@@ -220,8 +221,11 @@ class _Planner:
         return None
 
     def _sooner(self, flight: Flight, k: int, n: int, ready: float) -> _Change:
-        """A leg that is apart, with less of a wait of an earlier plan, if that is enough."""
+        """A leg that is apart, with less height or wait of an earlier plan, if that is enough."""
         leg = flight.legs[n]
+        lower = self._lower(flight, k, n, ready)
+        if lower is not None:
+            return lower
         without = replace(leg, hold_until=-math.inf)
         begin, planned = (leg_times(flight, each, ready, n == 0).begin for each in (without, leg))
         for share in _SOONER:
@@ -233,6 +237,18 @@ class _Planner:
             if self._is_apart(flight, k, n, sooner, times):
                 return _Change(sooner, wait, f'waits {wait:.0f} s only', 'hold')
         return _Change(leg, 0.0, '', '')
+
+    def _lower(self, flight: Flight, k: int, n: int, ready: float) -> _Change | None:
+        """A return at less height than an earlier plan gave it; None: it stays as it is."""
+        leg = flight.legs[n]
+        if not _returns_higher(leg):
+            return None
+        saved = [each for each in self._heights(flight, leg) if each.seconds < -_LEAST_SAVED]
+        for change in sorted(saved, key=lambda each: each.seconds):
+            times = leg_times(flight, change.leg, ready, n == 0)
+            if self._is_apart(flight, k, n, change.leg, times):
+                return replace(change, seconds=0.0)
+        return None
 
     def _is_apart(self, flight: Flight, k: int, n: int, leg: FlightLeg, times: LegTimes,
                   whole: bool = True) -> bool:
@@ -263,7 +279,7 @@ class _Planner:
         for level in levels:
             if not limits.altitude_min <= level <= limits.altitude_max:
                 continue
-            for path in {_slanted(flight, leg, points, level), _upright(leg, points, level)}:
+            for path in {slanted(flight, leg, points, level), upright(leg, points, level)}:
                 new = replace(leg, points=path)
                 if path != leg.points and limits.is_clear(new.flown()):
                     price = flight.leg_seconds(new) - planned + _PRICE * max(
@@ -307,44 +323,10 @@ def _keeps_deadlines(flight: Flight, n: int, delay: float, ready: float) -> bool
     return True
 
 
-def _upright(leg: FlightLeg, points: Sequence[Point], level: float) -> tuple[Point, ...]:
-    """A leg that changes its height above its ends."""
-    a, b = points[0], points[-1]
-    inner = [(x, y, max(z, level)) for x, y, z in points[1:-1]]
-    first = [(a[0], a[1], level)] if max(a[2], leg.top) != level else []
-    last = [(b[0], b[1], level)] if b[2] != level else []
-    return (a, *first, *inner, *last, b)
-
-
-def _slanted(flight: Flight, leg: FlightLeg, points: Sequence[Point],
-             level: float) -> tuple[Point, ...]:
-    """A leg that changes its height on the way, if it is long enough at no cost of time."""
-    a, b = points[0], points[-1]
-    inner = [(x, y, max(z, level)) for x, y, z in points[1:-1]]
-    path: list[Point] = [a]
-    start = max(a[2], leg.top)  # above the pad, where that is known
-    if start != level:
-        goal = inner[0] if inner else b
-        upright = leg.takes_off and leg.top == -math.inf
-        path.append((a[0], a[1], level) if upright else _along(
-            a, goal, flight.cruise * _vertical_seconds(flight, level - start), level))
-    path += inner
-    if b[2] != level:
-        before = inner[-1] if inner else a
-        path.append((b[0], b[1], level) if leg.lands else _along(
-            b, before, flight.cruise * _vertical_seconds(flight, b[2] - level), level))
-    return (*path, b)
-
-
-def _vertical_seconds(flight: Flight, rise: float) -> float:
-    return rise / flight.climb if rise > 0.0 else -rise / flight.descent
-
-
-def _along(a: Point, b: Point, metres: float, level: float) -> Point:
-    """The point at some horizontal distance from a towards b, at most _STEEP of the way."""
-    length = math.dist(a[:2], b[:2])
-    share = min(_STEEP, metres / length) if length > 0.0 else 0.0
-    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), level
+def _returns_higher(leg: FlightLeg) -> bool:
+    """Whether a leg is a return that climbs first."""
+    return leg.lands and not leg.climbs_first and (
+        max(point[2] for point in leg.points) > leg.points[0][2])
 
 
 def _explained(before: Sequence[Flight], planner: _Planner, each: FoundConflict,

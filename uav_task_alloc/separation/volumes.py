@@ -111,6 +111,7 @@ class Flight:
         speed_error: share by which its times are off, as measured; None: that of the rule.
         pace: as measured; None: the speeds alone.
         share: of its speed that it has at `begin`, 0 to 1.
+        waits: it is in the air at the stop before its first leg, which has not begun.
         goes_on: what follows the last leg is not planned yet; it does not stay there.
     """
 
@@ -127,6 +128,7 @@ class Flight:
     speed_error: float | None = None
     pace: Pace | None = None
     share: float = 0.0
+    waits: bool = False
     goes_on: bool = False
 
     def seconds(self, points: Sequence[Point]) -> float:
@@ -207,13 +209,13 @@ def leg_times(flight: Flight, leg: FlightLeg, ready: float, first: bool = False)
         flight: with its speeds.
         leg: to be flown.
         ready: [s] when the service before is over.
-        first: it is the first leg; in the air that waits at its end.
+        first: it is the first leg; in the air that waits at its end, unless the flight `waits`.
 
     Returns:
         Its times.
     """
     seconds = flight.leg_seconds(leg, first)
-    if first and flight.in_air:
+    if first and flight.in_air and not flight.waits:
         arrival = ready + seconds
         return LegTimes(ready, ready, arrival, max(arrival, leg.earliest) + leg.service)
     if leg.takes_off and flight.pace is not None:
