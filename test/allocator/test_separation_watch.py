@@ -227,3 +227,20 @@ def test_a_pilot_who_flies_past_his_home_is_predicted_by_the_velocity():
                'authority': 'LOST', 'mode': 'HOLD'}, {'velocity': (15.0, 0.0, 0.0)})
     sky.report((0.0, 20.0, 50.0), (-150.0, 150.0, 50.0))
     assert sky.step() == [('u2', True)]
+
+
+def test_a_wait_of_the_plan_in_the_air_is_spent_at_the_stop_before():
+    sky = Sky(first={'velocity': (0.0, 0.0, 0.0)})
+    sky.world.params = AllocatorParams(background_budget=0.0, route_end='hold')
+    sky.report((-100.0, 0.0, 50.0), (0.0, -300.0, 50.0))
+    sky.add(Task('t0', (-100.0, 0.0, 50.0), allowed_uavs=frozenset({'u1'})))
+    sky.settle(wait=2.0, report=False)
+    lists = sky.world.lists.lists
+    later, first = lists['u1'].stops
+    lists['u1'] = replace(lists['u1'], stops=(first, replace(
+        later, begin_after=sky.now + 120.0)))
+    sky.event('COMPLETED', 't0', 'u1')
+    sky.core.tick(sky.now, sky.now)
+    sky.world.params = AllocatorParams(background_budget=0.0, route_end='hold', **RULE)
+    sky.report((-100.0, 0.0, 50.0), (0.0, -102.0, 50.0))  # it would meet u1 if that set out now
+    assert sky.step() == []

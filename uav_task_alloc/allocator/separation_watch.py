@@ -188,7 +188,8 @@ class SeparationWatch:
         points = [(0.0, place), (clock, place)]
         for k, stop in enumerate(stops):
             leg = stop.line
-            waits_before = k > 0 or flight.on_ground  # as the bridge does, not at the task
+            # as the bridge does, not at the task
+            waits_before = k > 0 or flight.on_ground or flight.waiting == stop.task.id
             if waits_before and stop.wait > 0.0:
                 clock += stop.wait
                 points.append((clock, place))

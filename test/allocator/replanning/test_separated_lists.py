@@ -13,7 +13,7 @@ from uav_task_alloc.allocator.replanning.task_lists import build_task_list
 from uav_task_alloc.model import Leg, Task, Uav
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.conflicts import find_conflicts
-from uav_task_alloc.separation.volumes import flight_volumes
+from uav_task_alloc.separation.volumes import flight_volumes, leg_times
 
 ON = {'separation__horizontal': 10.0, 'separation__vertical': 5.0, 'separation__time': 2.0}
 SPEEDS = {'cruise_speed': 10.0, 'climb_speed': 2.5, 'descent_speed': 1.5}
@@ -190,3 +190,35 @@ def test_the_leg_under_way_keeps_its_heights_though_the_straight_one_is_shorter(
                      for keep in (True, False))
     assert kept.stops[0].leg.via == via
     assert dropped.stops[0].leg.via == ()
+
+
+def waits_at_the_stop_before():
+    """`a` waits at its first task up to 100 s for a second one, as of a plan long ago."""
+    driver = AllocatorDriver(**ON)
+    driver.uav('a', 0.0, 0.0, 50.0, **SPEEDS)
+    driver.add(Task('ta0', (0.0, 0.0, 50.0), allowed_uavs={'a'}),
+               Task('ta', (300.0, 0.0, 50.0), allowed_uavs={'a'}))
+    driver.settle()
+    lists = driver.world.lists.lists
+    first, later = lists['a'].stops
+    lists['a'] = replace(lists['a'], stops=(first, replace(later, begin_after=driver.now + 130.0)))
+    driver.event('COMPLETED', 'ta0', 'a')
+    driver.core.tick(driver.now, driver.now)
+    driver.uav('a', 0.0, 0.0, 50.0, velocity=(0.0, 0.0, 0.0), **SPEEDS)
+    return driver
+
+
+def test_a_uav_that_waits_at_the_stop_before_is_planned_there_and_not_at_its_task():
+    driver = waits_at_the_stop_before()
+    world = driver.world
+    flight = planned_flights(world, world.lists_in_force(), driver.now)['a']
+    assert leg_times(flight, flight.legs[0], 0.0, True).begin > 80.0
+    assert flight.legs[0].movable
+
+
+def test_a_wait_that_has_begun_ends_when_the_conflict_is_over():
+    driver = waits_at_the_stop_before()
+    driver.world.request_replan('test', driver.now)
+    driver.settle(report=False)
+    assert driver.lists['a'].stops[0].wait == 0.0
+    assert driver.lists['a'].stops[0].begin_after == 0.0

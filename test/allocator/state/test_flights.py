@@ -2,6 +2,7 @@
 """Wind, speeds and stops are measured; arrivals follow from them and from windows."""
 import math
 import random
+from dataclasses import replace
 
 import pytest
 from allocation import AllocatorDriver
@@ -239,3 +240,55 @@ def test_a_uav_that_was_without_a_list_on_a_leg_measures_no_stop():
     driver.now += 15.0
     driver.event('COMPLETED', 'u200', 'a')
     assert driver.world.flights.pace('a').stop_time == 10.0 / 2.5
+
+
+def waiting(before=20.0, **hold):
+    """A UAV that has completed t100 and waits there, then on the way, for that time [s]."""
+    driver = AllocatorDriver()
+    driver.uav('a', 100.0, 0.0, 50.0, cruise_speed=10.0)
+    driver.add(*(at(100 * k) for k in range(1, 4)))
+    driver.settle()
+    lists, flights = driver.world.lists.lists, driver.world.flights
+    first, later, last = lists['a'].stops
+    lists['a'] = replace(lists['a'], stops=(first, replace(
+        later, begin_after=driver.now + before + 14.0), last))
+    driver.event('COMPLETED', 't100', 'a')
+    driver.uav('a', 100.0, 0.0, 50.0, cruise_speed=10.0)
+    driver.core.tick(driver.now, driver.now)
+    driver.now += before
+    driver.uav('a', 101.0, 0.0, 50.0, cruise_speed=10.0, **hold)
+    return driver, flights
+
+
+def test_a_uav_waits_at_the_stop_before_until_it_sets_out():
+    driver, flights = waiting()
+    assert flights.of('a', driver.now).waiting == 't200'
+    driver.uav('a', 120.0, 0.0, 50.0, cruise_speed=10.0)
+    assert flights.of('a', driver.now).waiting == ''
+    driver.uav('a', 100.0, 0.0, 50.0, cruise_speed=10.0)
+    assert flights.of('a', driver.now).waiting == ''
+
+
+def test_a_uav_whose_task_is_taken_away_waits_no_more():
+    driver, flights = waiting()
+    driver.cancel('t200')
+    driver.settle(wait=1.0, report=False)
+    driver.uav('a', 100.0, 0.0, 50.0, cruise_speed=10.0)
+    assert driver.route('a') == ('t300',)
+    assert flights.of('a', driver.now).waiting == ''
+
+
+def test_a_wait_before_a_leg_is_no_time_lost_at_a_stop():
+    driver, flights = waiting(before=6.0)
+    driver.now += 14.0
+    driver.event('COMPLETED', 't200', 'a')
+    assert flights.pace('a').stop_time == 10.0 / 2.5
+    assert flights.of('a', driver.now).late == 0.0
+
+
+def test_a_leg_in_which_a_uav_was_held_measures_no_stop():
+    driver, flights = waiting(before=0.0, mode='HOLD')
+    driver.now += 14.0 + 8.0
+    driver.event('COMPLETED', 't200', 'a')
+    assert flights.pace('a').stop_time == 10.0 / 2.5
+    assert flights.of('a', driver.now).late == 0.0

@@ -119,9 +119,11 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
     """What a UAV flies by its list, up to a leg that ends after `until` [s] from now."""
     own, legs, place = _empty(each.uav, flight, rule), list[FlightLeg](), flight.position
     clock = 0.0  # [s] from now
+    if each.stops and flight.waiting == each.stops[0].task.id:  # it has not set out
+        own = replace(own, waits=True, share=0.0)
     for k, stop in enumerate(each.stops):
         takes_off = k == 0 and flight.on_ground
-        under_way = k == 0 and not flight.on_ground and _same_leg(published, stop)
+        under_way = k == 0 and not (flight.on_ground or own.waits) and _same_leg(published, stop)
         line = (*stop.leg.via, stop.entry)
         ahead = stop.line[points_passed(place, stop.line):] if under_way else line
         along = bool(stop.task.path) and not under_way  # the path is a leg of its own

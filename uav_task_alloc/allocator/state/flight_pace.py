@@ -181,6 +181,7 @@ class UavFlight:
     climbing: bool = False  # its take-off has begun
     serving: str = ''  # id of the task that it has reached and not completed
     served: float = 0.0  # [s] since it reached that
+    waiting: str = ''  # id of the task before whose leg it waits, at the stop before
     home: Point | None = None  # [m] ENU
     velocity: Point | None = None  # [m/s] ENU over ground; None: unknown
     takeoff_top: float = -math.inf  # [m] ENU at which its take-off ends; -inf: at its first point

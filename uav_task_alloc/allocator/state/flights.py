@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
@@ -15,7 +15,7 @@ from uav_task_alloc.allocator.state.flight_pace import (
 )
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.wind import WindEstimate
-from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.model import Point, Task, Uav
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.rule import FORGOTTEN
 
@@ -28,6 +28,9 @@ AT_HOME = 10.0  # [m] from its home within which a UAV on the ground is at its b
 _AT_STOP = 3.0  # [m] within which a task is reached that has no radius of its own
 _SMOOTHING = 0.3  # weight of a new time lost at a stop
 _SHORTEST_LEG = 1.0  # [s] at full speed below which a leg says nothing about stops
+_AT_WAIT = 10.0  # [m] from a stop within which a UAV waits there
+_CIRCLE = 1.2  # times the radius of a hold within which a fixed wing waits
+SHORTEST_WAIT = 1.0  # [s] of a wait before a leg; a shorter one is not flown
 _LONGEST_STOP = 20.0  # [s] a longer delay is not that of a stop
 _OWN_STOPS = 3  # stops after which a UAV has a mean of its own
 _ERRORS = 2.0  # times the mean error that is expected
@@ -111,6 +114,7 @@ class Flights:
         self._reached: dict[str, tuple[str, float]] = {}  # task and stamp of the arrival
         self._all_stops, self._stops = _Stops(), dict[str, _Stops]()
         self._legs: dict[str, _Leg] = {}
+        self._waits: dict[str, tuple[str, Point]] = {}  # the next task, and where it waits first
         self._errors: dict[str, _LegErrors] = {}
         self._reported: dict[str, float] = {}  # [s] stamp of the last report
         self._landed: dict[str, float] = {}  # [s] stamp since which it is on the ground at home
@@ -127,8 +131,10 @@ class Flights:
         stops = self._lists.get(report.uav_id).stops
         task = stops[0].task if stops else None
         leg = self._legs.get(report.uav_id)
-        if leg is not None and (task is None or leg.task != task.id) and stamp > leg.began:
-            del self._legs[report.uav_id]  # it flies elsewhere, or nowhere
+        if leg is not None and stamp > leg.began and (
+                task is None or leg.task != task.id or report.mode == 'HOLD'):
+            del self._legs[report.uav_id]  # it flies elsewhere, or nowhere, or was held
+        self._end_wait(report, [stop.task.id for stop in stops[:2]])
         reached = self._reached.get(report.uav_id, ('', 0.0))[0]
         if task is not None and reached == task.id and task.path:
             return  # it flies along its path
@@ -137,6 +143,18 @@ class Flights:
             self._reached.pop(report.uav_id, None)
         elif reached != task.id:
             self._reached[report.uav_id] = task.id, stamp
+
+    def _end_wait(self, report: UavReport, ahead: Sequence[str]) -> None:
+        """Note that a UAV waits no more: it has set out, or has another task.
+
+        Args:
+            report: of the UAV.
+            ahead: ids of its next two tasks; the first may just be completed.
+        """
+        waits_for, place = self._waits.get(report.uav_id, ('', report.position))
+        if waits_for not in ahead or math.dist(place, report.position) > (
+                _AT_WAIT + _CIRCLE * report.hold_radius):
+            self._waits.pop(report.uav_id, None)
 
     def _sample(self, report: UavReport, stamp: float) -> None:
         """Take the ground velocity of steady level flight."""
@@ -173,14 +191,18 @@ class Flights:
         following = stops[1]
         way = stops[0].exit, *following.line
         pace = self.pace(uav_id)
-        seconds = pace.seconds(way)
-        if max(following.task.earliest, following.task.release) < stamp + seconds:  # no wait
+        seconds, predicted = pace.seconds(way), pace.from_stop(way)
+        begins = max(following.task.earliest, following.begin_after)
+        if max(begins - predicted, following.task.release) > stamp + SHORTEST_WAIT:
+            self._waits[uav_id] = following.task.id, stops[0].exit
+        elif max(begins - seconds, following.task.release) < stamp:
             self._legs[uav_id] = _Leg(following.task.id, stamp, seconds, pace.corners(way),
-                                      following.task.stay, pace.from_stop(way))
+                                      following.task.stay, predicted)
 
     def clock_jumped(self) -> None:
         """Drop what was measured across a jump of the published clock."""
         self._legs.clear()
+        self._waits.clear()
         self._sampled.clear()
         self._reached.clear()
         self._landed.clear()
@@ -190,7 +212,7 @@ class Flights:
         """Drop what is kept of a UAV."""
         self.wind.forget(uav_id)
         for kept in (self._sampled, self._reached, self._stops, self._legs, self._landed,
-                     self._errors, self._reported):
+                     self._waits, self._errors, self._reported):
             kept.pop(uav_id, None)
 
     def serving(self, uav_id: str) -> str:
@@ -208,7 +230,8 @@ class Flights:
         return UavFlight(
             report.position, self.pace(uav_id), stamp, on_ground=report.standby,
             climbing=report.mode == 'TAKEOFF', serving=task_id,
-            served=max(0.0, stamp - reached), home=record.home, velocity=report.velocity,
+            served=max(0.0, stamp - reached),
+            waiting=self._waits.get(uav_id, ('',))[0], home=record.home, velocity=report.velocity,
             takeoff_top=top, late=errors.seconds,
             time_error=_ERRORS * errors.share if errors.count >= _OWN_STOPS else math.inf)
 
