@@ -66,6 +66,17 @@ class CommandSender:
         """More than _RETRIES failures in a row."""
         return self._retries > _RETRIES
 
+    @property
+    def climbs_by_mission(self) -> bool:
+        """Whether its mission has taken it off: nobody else has to.
+
+        While its first position estimates settle it may look airborne on the ground, and mission
+        mode is set there.
+        """
+        telemetry = self._telemetry
+        return (telemetry.mode is ModeFunction.MISSION and telemetry.airborne
+                and telemetry.landed != d.MAV_LANDED_STATE_ON_GROUND)
+
     def drop(self) -> None:
         """Drop the open command and its state: another party controls the vehicle."""
         self._command = self._arming_since = None
@@ -238,7 +249,8 @@ class CommandSender:
         takeoff = self._profile.takeoff_command(self._peer, height, ground)
         return self.start(Command('take off', takeoff,
                                   lambda: telemetry.mode is ModeFunction.TAKEOFF,
-                                  wanted=wanted), now, self._took_off)
+                                  wanted=lambda: wanted() and not self.climbs_by_mission),
+                          now, self._took_off)
 
     def disarm(self, now: float) -> list[Message]:
         """Disarm on the ground, after arming by the bridge, when there is nothing to fly."""

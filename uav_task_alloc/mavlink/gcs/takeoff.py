@@ -39,6 +39,8 @@ class Takeoff:
 
     def continue_takeoff(self, now: float) -> NextMessages:
         """Let a vehicle that we armed take off before anything else is sent, or disarm it."""
+        if self._sender.climbs_by_mission:
+            self._sender.armed_here = False
         if not self._sender.armed_here or self._telemetry.airborne or not self._authority.held:
             return None
         return self.take_off(now) if self._wants_to_fly() else self._sender.disarm(now)

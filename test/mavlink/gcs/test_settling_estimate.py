@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A vehicle whose first position estimates jump up and down while it gets its first list."""
+import pytest
+from findings_bench import FindingsBench
+from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+SETTLES = {'arming_delay': 3.0, 'boot_delay': 1.0, 'settling_time': 8.0}
+
+
+def started_while_settling(wait):
+    """A PX4 vehicle whose list comes `wait` seconds after its first position, in the air."""
+    bench = FindingsBench('px4', configs={1: SETTLES}).discover()
+    flight = bench.vehicles[1].flight
+    assert bench.run(lambda: flight.positioned, 30.0)
+    bench.run(limit=wait)
+    bench.assign(task_list('ABC', side=300.0))
+    assert bench.run(lambda: bench.executor().telemetry.landed not in (
+        d.MAV_LANDED_STATE_ON_GROUND, d.MAV_LANDED_STATE_UNDEFINED), 60.0)
+    return bench
+
+
+@pytest.mark.parametrize('wait', [0.5, 1.0, 1.5, 2.0])
+def test_the_next_list_does_not_wait_for_a_take_off_that_its_mission_has_made(wait):
+    bench = started_while_settling(wait)
+    bench.run(limit=1.0)
+    bench.assign(task_list('BCA', revision=2, side=300.0))
+    assert bench.run(lambda: bench.state().list_revision == 2, 2.0)
+    assert bench.noted('take off') == []
+
+
+def test_after_its_landing_it_is_not_armed_by_the_bridge():
+    bench = started_while_settling(0.5)
+    bench.run(limit=2.0)
+    assert not bench.executor().sender.armed_here
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
