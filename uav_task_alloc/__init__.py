@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Allocates tasks to UAVs as they arrive, around threat zones; imports no ROS."""
-from __future__ import annotations
+import sys  # nothing before this reads a file, as `from __future__` would
+
+if sys.argv[:1] == ['-m'] and __name__ in sys.orig_argv:  # as a program, whose first code this is
+    import _signal  # type: ignore[import-not-found]
+
+    # Python's own handler prints where an import was interrupted
+    if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
 
 from importlib import import_module
 
@@ -23,7 +30,7 @@ _MODULES = {'SOLVERS': 'solver.registry', 'Objective': 'objective', 'plan': 'sol
             **dict.fromkeys(('Plan', 'Task', 'ThreatZone', 'Uav'), 'model')}
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> 'Any':
     """Import a public name at its first use, so that nodes start without loading numba."""
     if name not in _MODULES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

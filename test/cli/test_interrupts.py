@@ -68,6 +68,32 @@ def test_ctrl_c_once_the_program_has_begun_prints_no_traceback():
     assert (process.returncode, out, err) == (130, '', 'interrupted\n')
 
 
+FIRST = """
+import os, signal, sys
+class Press:
+    def find_spec(self, name, path, target=None):
+        if name in ('__future__', 'uav_task_alloc.cli'):
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Press())
+"""
+
+
+@pytest.mark.parametrize('as_module', [True, False], ids=['program', 'library'])
+def test_ctrl_c_during_the_first_import_of_the_package_prints_no_traceback(as_module, tmp_path):
+    (tmp_path / 'sitecustomize.py').write_text(FIRST)
+    call = ['-m', 'uav_task_alloc'] if as_module else ['-c', 'import uav_task_alloc.cli']
+    done = subprocess.run([sys.executable, *call], cwd=ROOT, text=True, capture_output=True,
+                          timeout=TIMEOUT, check=False,
+                          env={**os.environ, 'PYTHONPATH': str(tmp_path)},
+                          preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+    assert done.stdout == ''
+    if as_module:
+        assert (done.returncode, done.stderr) == (-signal.SIGINT, '')
+    else:  # a library changes no handler
+        assert done.stderr.endswith('KeyboardInterrupt\n')
+
+
 def test_ctrl_c_during_a_compilation_is_one_line(tmp_path):
     with start('compile', NUMBA_CACHE_DIR=str(tmp_path)) as process:
         assert process.stderr.readline().startswith('compiling kernels')
