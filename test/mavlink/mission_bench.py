@@ -77,8 +77,9 @@ class Line:
                 heapq.heappush(self._flying, (now + delay, self._number, direction, key, frame))
 
     def due(self, now):
-        while self._flying and self._flying[0][0] <= now + 1e-9:
-            yield heapq.heappop(self._flying)[2:]
+        flying, until = self._flying, now + 1e-9
+        while flying and flying[0][0] <= until:
+            yield heapq.heappop(flying)[2:]
 
     def sent(self, kind, direction='up'):
         """Messages of a type that were sent over the line, lost ones included."""

@@ -54,22 +54,25 @@ class PointMass:
         if self._wind is not None:
             self._wind.step(dt)
             velocity = held_velocity(velocity, self._wind.velocity, self._max_airspeed)
-        change = _minus(velocity, self.velocity)
+        (x, y, z), (vx, vy, vz), (cx, cy, cz) = self.position, self.velocity, velocity
+        cx, cy, cz = cx - vx, cy - vy, cz - vz
         most = self._config.acceleration * dt
-        share = min(1.0, most / max(_norm(change), 1e-9))
-        self.velocity = vx, vy, _ = _plus(self.velocity, change, share)
+        share = min(1.0, most / max(math.sqrt(cx * cx + cy * cy + cz * cz), 1e-9))
+        self.velocity = vx, vy, vz = vx + cx * share, vy + cy * share, vz + cz * share
         if self.fixed_heading is not None:
             self.heading = self.fixed_heading
         elif math.hypot(vx, vy) > 0.5:
             self.heading = math.atan2(vy, vx)
-        self.position = _plus(self.position, self.velocity, dt)
-        self.flown += _norm(self.velocity) * dt
+        self.position = x + vx * dt, y + vy * dt, z + vz * dt
+        self.flown += math.sqrt(vx * vx + vy * vy + vz * vz) * dt
         self._drain(dt)
 
     def _drain(self, dt: float) -> None:
         config, (vx, vy, vz) = self._config, self.velocity
-        wx, wy = (0.0, 0.0) if self._wind is None else self._wind.velocity
-        airspeed = _norm((vx - wx, vy - wy, vz))
+        if self._wind is not None:
+            wx, wy = self._wind.velocity
+            vx, vy = vx - wx, vy - wy
+        airspeed = math.sqrt(vx * vx + vy * vy + vz * vz)
         drain = (max(airspeed, _HOVER * config.cruise_speed)
                  + _CLIMB * max(0.0, vz)) * dt / config.range
         self.drain = max(drain, dt / config.endurance) / dt
@@ -82,22 +85,23 @@ class PointMass:
 
     def _desired_velocity(self, dt: float, target: Point, speed: float,
                           exit_speed: float) -> Point:
-        gap = _minus(target, self.position)
+        gap = gx, gy, gz = _minus(target, self.position)
         distance = _norm(gap)
         if distance < 1e-6:
             return 0.0, 0.0, 0.0
-        braking = _BRAKING * self._config.acceleration
+        acceleration = self._config.acceleration
+        braking = _BRAKING * acceleration
         limit = min(speed, math.sqrt(exit_speed**2 + 2.0 * braking * distance))
         if exit_speed == 0.0:
             limit = min(limit, distance / dt)
         # the rest of the acceleration ends the motion across the path
-        along = sum(v * g for v, g in zip(self.velocity, gap, strict=True)) / distance
-        limit = min(limit, max(0.0, along) + self._config.acceleration * dt)
-        steep = abs(gap[2]) / distance
-        rate = self._config.climb_rate if gap[2] > 0.0 else self._config.descent_rate
+        along = _dot(self.velocity, gap) / distance
+        limit = min(limit, max(0.0, along) + acceleration * dt)
+        steep = abs(gz) / distance
+        rate = self._config.climb_rate if gz > 0.0 else self._config.descent_rate
         if limit * steep > rate:
             limit = rate / steep
-        return gap[0] / distance * limit, gap[1] / distance * limit, gap[2] / distance * limit
+        return gx / distance * limit, gy / distance * limit, gz / distance * limit
 
     def land_at(self, height: float) -> None:
         """Come to rest on the ground at `height` [m] ENU."""
@@ -154,7 +158,9 @@ class Track:
     @property
     def target(self) -> Point | None:
         """The point to fly to; the last one while holding, None where there is none."""
-        return self.points[min(self._next, len(self.points) - 1)] if self.points else None
+        if self._next < len(self.points):
+            return self.points[self._next]
+        return self.points[-1] if self.points else None
 
     def exit_speed(self, position: Point, then: Point | None, acceleration: float) -> float:
         """Speed [m/s] at which the target may be passed for a turn within _CORNER.
@@ -173,7 +179,7 @@ class Track:
             return 0.0
         inward, outward = _minus(target, position), _minus(then, target)
         lengths = _norm(inward) * _norm(outward)
-        cosine = sum(a * b for a, b in zip(inward, outward, strict=True)) / max(lengths, 1e-9)
+        cosine = _dot(inward, outward) / max(lengths, 1e-9)
         sine = 1.0 if cosine <= 0.0 else math.sqrt(max(0.0, 1.0 - cosine**2))
         return math.sqrt(2.0 * acceleration * _CORNER) / max(sine, 1e-3)
 
@@ -213,6 +219,10 @@ def _minus(a: Point, b: Point) -> Point:
 
 def _plus(a: Point, b: Point, factor: float) -> Point:
     return a[0] + b[0] * factor, a[1] + b[1] * factor, a[2] + b[2] * factor
+
+
+def _dot(a: Point, b: Point) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _norm(a: Point) -> float:

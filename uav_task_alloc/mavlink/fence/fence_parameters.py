@@ -72,6 +72,15 @@ class FenceParameters:
         self.values[message.param_id] = value
         self._asked.pop(message.param_id, None)
 
+    def is_idle(self, now: float, fences: bool = True) -> bool:
+        """Whether `step` would return nothing.
+
+        Args:
+            now: steady time [s].
+            fences: those about fences too, not only about returns.
+        """
+        return fences == self._fences and now < self._due
+
     def step(self, now: float, fences: bool = True) -> list[Message]:
         """The requests that are due.
 

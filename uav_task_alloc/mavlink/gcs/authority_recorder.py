@@ -70,17 +70,18 @@ class AuthorityRecorder:
             return
         if state.unexplained is None:  # else a restarted bridge would accept the new mode
             self._mode = state.mode
-        position, passed = self._evidence.mission_position(), self._evidence.passed()
+        evidence = self._evidence
+        position, passed = evidence.mission_position(), evidence.passed()
         fields = (
             authority.state, authority.why, authority.since, authority.killed, authority.landed,
             authority.until_landing, state.flown, self._mode, state.armed,
             tuple(dict.fromkeys(mode for mode, _ in sent.modes)) if sent.modes else (),
             sent.arm_until > -math.inf and not state.armed and authority.held,
             state.replacing_since, sent.climb, tuple(self.marks.values()),
-            *position, passed, self._evidence.uploading(),
+            *position, passed, evidence.uploading(),
             self._last_position(passed),
             None if math.isnan(state.landed_battery) else round(state.landed_battery, 3),
-            self._evidence.pieces(), self._evidence.ahead(position[1]))
+            evidence.pieces(), evidence.ahead(position[1]))
         if fields == self._fields:  # as after most messages
             return
         self._fields, record = fields, AuthorityRecord(*fields)

@@ -45,9 +45,11 @@ class MessageRates:
         if silent - self._silent and not self._telemetry.stale(now):
             self.restart(now)
         self._silent = silent
+        if now < self._due or self._requests >= MAX_REQUESTS:
+            return []
         missing = [number for number in rates
                    if number in silent or number not in self._telemetry.received_ids]
-        if now < self._due or self._requests >= MAX_REQUESTS or (self._requests and not missing):
+        if self._requests and not missing:
             return []
         self._requests += 1
         self._due = now + _PERIOD

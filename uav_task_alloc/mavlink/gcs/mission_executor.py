@@ -234,8 +234,12 @@ class MissionExecutor:
         self._report(now)  # the marks are saved with the current item that is past their tasks
         self.watch.step(now)
         self.onboard.complete_flown(now)
-        out = next((step for rule in self._rules if (step := rule(now)) is not None), [])
-        out = self.fence.step(now) + out
+        out: NextMessages = None
+        for rule in self._rules:
+            out = rule(now)
+            if out is not None:
+                break
+        out = self.fence.step(now) + (out or [])
         self._report(now)
         return out
 
@@ -245,8 +249,9 @@ class MissionExecutor:
         self.notes += passed_over(onboard, self.watch, now)
         for notes in (self.watch.notes, onboard.notes, onboard.list.notes, self.sender.notes,
                       self.fence.notes):
-            self.notes += notes
-            notes.clear()
+            if notes:
+                self.notes += notes
+                notes.clear()
 
     def _update_progress(self, message: Message, newest: bool, now: float) -> None:
         kind, progress, own = message.get_type(), self.onboard.progress, self.onboard.own

@@ -137,10 +137,10 @@ class Resume:
             now: steady time [s].
         """
         telemetry = self._telemetry
-        unknown = telemetry.current is None or not telemetry.has_position
-        in_air = telemetry.airborne or (
+        if self.located or not held or (telemetry.current is not None and telemetry.has_position):
+            return False
+        return telemetry.airborne or (
             not telemetry.grounded and now - read_at < _LANDED_STATE_DELAY)
-        return bool(held) and not self.located and unknown and in_air
 
     def locate(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
         """Locate the vehicle in its onboard mission, once.

@@ -10,7 +10,10 @@ from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> list[TaskProgress]:
     """Events of tasks since the last call; completed ones are marked in the authority record."""
-    events, progress, revision = [], onboard.progress, onboard.revision
+    events: list[TaskProgress] = []
+    progress, revision = onboard.progress, onboard.revision
+    if not progress.events and not onboard.failed:  # as at most calls
+        return events
     while progress.events:
         event = progress.events.popleft()
         kind = 'COMPLETED' if event.completed else 'STARTED'

@@ -116,7 +116,7 @@ class Telemetry:
     @property
     def airborne(self) -> bool:
         """Armed and off the ground."""
-        return self.armed and self.off_ground
+        return self.armed and (self.height > OFF_GROUND or self.landed in _IN_AIR)
 
     @property
     def grounded(self) -> bool:

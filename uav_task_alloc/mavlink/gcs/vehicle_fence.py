@@ -102,9 +102,10 @@ class VehicleFence:
     @property
     def _flies_around(self) -> bool:
         """Whether the vehicle itself flies around all zones; not for a moment, by a readback."""
-        if self.verified:
+        state = self.state
+        if state is FenceState.VERIFIED:
             self._was_verified = True
-        elif self.state not in (FenceState.UNKNOWN, FenceState.UPLOADING):
+        elif state not in (FenceState.UNKNOWN, FenceState.UPLOADING):
             self._was_verified = False
         return (self._was_verified and self.active and self.parameters.plans_around
                 and not self.left_out)
@@ -133,15 +134,17 @@ class VehicleFence:
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of the vehicle; returns messages to send."""
-        out = self.rally.transfer.receive(message, now) if self._policy().rally else []
+        policy = self._policy()
+        out = self.rally.transfer.receive(message, now) if policy.rally else []
         self.parameters.receive(message)
-        if not self.active:
+        if policy.fences == 'off':
             return out
         return out + self.transfer.receive(message, now)
 
     def step(self, now: float) -> list[Message]:
         """Choose the fence, and go on with its transfer; returns messages to send."""
-        if not self.active and not self._policy().rally:
+        policy = self._policy()
+        if policy.fences == 'off' and not policy.rally:
             return (self.transfer.cancel() + self.rally.transfer.cancel()
                     + self._read_return_height(now))
         if self._telemetry.stale(now) or not self._telemetry.past_boot:
@@ -159,6 +162,8 @@ class VehicleFence:
 
     def _read_return_height(self, now: float) -> list[Message]:
         """Read how high it returns, for `UavState`, also without fences."""
+        if self.parameters.is_idle(now, fences=False):
+            return []
         idle = not (self._telemetry.stale(now) or self._onboard.upload.busy)
         if not (idle and self._telemetry.past_boot and self._authority.allows(SendAction.READ)):
             return []

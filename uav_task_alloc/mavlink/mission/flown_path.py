@@ -187,11 +187,13 @@ class FlownPath:
         speeds = self._speeds[-200:]
         if speeds and (top := max(speeds)) >= _USUAL_SPEED:
             return top
-        moving = sum(speed > _HOLD_SPEED for speed in speeds)
+        moving = len([speed for speed in speeds if speed > _HOLD_SPEED])
         return max((5.0 if moving >= _FEW else _USUAL_SPEED, *speeds))
 
     def _since(self, since: float, until: float = math.inf) -> list[PositionSample]:
         at = bisect_left(self._samples, since, key=lambda one: one.t)
+        if until == math.inf:
+            return self._samples[max(0, at - 1):]
         end = bisect_left(self._samples, until, key=lambda one: one.t)
         return self._samples[max(0, at - 1):end + 1]
 

@@ -34,7 +34,8 @@ def defect(message: Message) -> str:
     Returns:
         Field, value and expectation; '' where all fields are valid.
     """
-    return next(_defects(message), '')
+    kind = message.get_type()
+    return next(_defects(message), '') if kind in _RANGES or kind in _ITEM_MESSAGES else ''
 
 
 def _defects(message: Message) -> Iterator[str]:

@@ -82,6 +82,7 @@ class WantedMission:
         self._leg_key: object = None  # the state for which the first leg was begun
         self._items: tuple[object, tuple[Item, ...]] | None = None  # cached, with their key
         self._remaining: tuple[object, TaskList] | None = None  # cached, with its key
+        self._state: object = None  # what of that key and list decides the items
         self._listed: dict[str, int] = {}  # the last revision with a task that was not completed
         self._dropped: frozenset[str] = frozenset()  # completed tasks that a later list dropped
 
@@ -157,18 +158,21 @@ class WantedMission:
     def remaining(self) -> TaskList:
         """The list less completed and refused tasks, up to the horizon."""
         assert self.tasks is not None
-        ended = tuple(self._progress.completed), self._progress.pending, tuple(self._refused)
-        coverage = self._progress.coverage
-        way_home = self.way_home.key
+        progress = self._progress
+        ended = tuple(progress.completed), progress.pending, tuple(self._refused)
+        coverage, way_home = progress.coverage, self.way_home.key
         key = self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest, way_home
         if self._remaining is None or self._remaining[0] != key:
             tasks = self.tasks.without(chain.from_iterable(ended))
             tasks = replace(tasks, stops=self._rests(tasks.stops))
             tasks = self.way_home.of(tasks)
-            key = (self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest,
-                   way_home)
-            self._remaining = key, (
-                tasks if self.horizon.stops is None else tasks.first(self.horizon.stops))
+            if self.horizon.stops is not None:
+                tasks = tasks.first(self.horizon.stops)
+            rest = (self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest)
+            self._remaining = (*rest, way_home), tasks
+            state = (*rest, tasks.returns, tasks.end_via)
+            if state != self._state:
+                self._state = state
         return self._remaining[1]
 
     def _rests(self, stops: tuple[MissionStop, ...]) -> tuple[MissionStop, ...]:
@@ -195,20 +199,16 @@ class WantedMission:
 
     def items(self) -> tuple[Item, ...]:
         """The items to fly from here; a task that cannot be an item is refused."""
-        self.waits.note_active(self.remaining(), self._progress.active)
-        coverage, ends = self._progress.coverage, self.remaining()
-        state = (self.tasks, ends.returns, ends.end_via, self.waits.version,
-                 len(self._progress.completed), self._progress.pending, len(self._refused),
-                 self.horizon.stops,
-                 coverage.version, coverage.latest, self.cruise())
+        remaining = self.remaining()
+        self.waits.note_active(remaining, self._progress.active)
+        state = (self._state, self.waits.version, self.cruise())
         if self._leg_key != state or self.leg.is_off:
-            self.leg.begin(self.remaining())
+            self.leg.begin(remaining)
             self._leg_key = state
-        lands = lands_by_item(self.remaining(), self._profile.rules, self._home())
+        lands = lands_by_item(remaining, self._profile.rules, self._home())
         key = (state, self.leg.version, self.leg.passed, lands)
         if self._items is not None and self._items[0] == key:
             return self._items[1]
-        remaining = self.remaining()
         try:
             items = self._items_of(remaining)
         except MissionError as error:

@@ -18,6 +18,8 @@ HEADER, CHECKSUM = 10, 2  # bytes of a frame before and after the payload
 V2 = dialect.PROTOCOL_MARKER_V2
 _HEADER = struct.Struct('<BBBBBBBHB')
 _CHECKSUM = struct.Struct('<H')
+_FAST_CRC: Any = getattr(dialect, 'mcrf4xx', None)  # where it is installed
+_CRC_START = 0xFFFF
 
 
 class _Layout:
@@ -36,6 +38,12 @@ class _Layout:
         self.values: Callable[[Any], Any] = attrgetter(*kind.ordered_fieldnames)
         empty = vars(kind(*range(len(self.names))))
         self.fixed = {name: value for name, value in empty.items() if name not in self.names}
+
+
+def _crc(content: bytes) -> int:
+    if _FAST_CRC is not None:
+        return int(_FAST_CRC(content, _CRC_START))
+    return int(dialect.x25crc(content).crc)
 
 
 @functools.cache
@@ -64,7 +72,7 @@ def decode_plain(frame: bytearray) -> Any | None:
     if layout is None:
         return None
     (crc,) = _CHECKSUM.unpack_from(frame, HEADER + length)
-    if dialect.x25crc(bytes(frame[1:-CHECKSUM]) + layout.crc_extra).crc != crc:
+    if _crc(bytes(frame[1:-CHECKSUM]) + layout.crc_extra) != crc:
         return None
     payload = frame[HEADER:HEADER + min(length, layout.size)]
     values = layout.unpack(payload.ljust(layout.size, b'\0'))
@@ -100,7 +108,7 @@ def pack_plain(message: Any, mav: Any) -> bytes | None:
     length, seq, system, component = len(payload), mav.seq, mav.srcSystem, mav.srcComponent
     content = _HEADER.pack(V2, length, 0, 0, seq, system, component, number & 0xffff, number >> 16
                            ) + payload
-    crc = dialect.x25crc(content[1:] + layout.crc_extra).crc
+    crc = _crc(content[1:] + layout.crc_extra)
     frame = content + _CHECKSUM.pack(crc)
     message._header = dialect.MAVLink_header(number, 0, 0, length, seq, system, component)
     message._payload, message._msgbuf, message._crc = payload, bytearray(frame), crc
