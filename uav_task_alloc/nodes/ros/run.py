@@ -22,6 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from uav_task_alloc.errors import AllocError
+from uav_task_alloc.nodes.ros.log_callers import name_callers_by_frames
 from uav_task_alloc.nodes.ros.parameter_files import files_of, read_sections
 from uav_task_alloc.parameter_field import CheckedParams
 from uav_task_alloc.parameter_texts import help_text
@@ -79,6 +80,7 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: signals.append(1))
+    name_callers_by_frames()
     # through shared memory a node that was killed and restarted receives nothing for 3 s
     os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
     try:
