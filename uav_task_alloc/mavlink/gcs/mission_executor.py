@@ -234,24 +234,20 @@ class MissionExecutor:
         self._report(now)  # the marks are saved with the current item that is past their tasks
         self.watch.step(now)
         self.onboard.complete_flown(now)
-        out: NextMessages = None
         for rule in self._rules:
-            out = rule(now)
-            if out is not None:
+            if (out := rule(now)) is not None:
                 break
         out = self.fence.step(now) + (out or [])
         self._report(now)
         return out
 
     def _report(self, now: float) -> None:
-        onboard = self.onboard
-        self.events += task_events(onboard, self.watch, now)
-        self.notes += passed_over(onboard, self.watch, now)
-        for notes in (self.watch.notes, onboard.notes, onboard.list.notes, self.sender.notes,
-                      self.fence.notes):
-            if notes:
-                self.notes += notes
-                notes.clear()
+        onboard, watch, sender, fence = self.onboard, self.watch, self.sender, self.fence
+        self.events += task_events(onboard, watch, now)
+        self.notes += passed_over(onboard, watch, now)
+        for notes in (watch.notes, onboard.notes, onboard.list.notes, sender.notes, fence.notes):
+            self.notes += notes
+            notes.clear()
 
     def _update_progress(self, message: Message, newest: bool, now: float) -> None:
         kind, progress, own = message.get_type(), self.onboard.progress, self.onboard.own
