@@ -258,3 +258,27 @@ def test_the_error_measured_of_a_uav_is_that_of_its_times():
     flights = [Flight('u', (), (0, 0, 40), speed_error=share, late=late)
                for share, late in ((None, 0.0), (0.05, 0.0), (0.05, 2.0))]
     assert [each.uncertainty(40.0, RULE) for each in flights] == pytest.approx([8.0, 2.0, 4.0])
+
+
+def climbing(name, x, z, goal):
+    """In its take-off above its pad, on the way to a task."""
+    pad = (x, 0.0, z)
+    return Flight(name, (FlightLeg((pad, goal), f't{name}', 5.0, top=50.0),), pad, 10.0, 2.5, 1.5)
+
+
+@pytest.mark.parametrize(('gap', 'rule'), [(10.5, RULE), (39.0, Separation(30.0, 10.0, 2.0))])
+def test_one_in_its_take_off_leaves_above_another_that_climbs_beside_it(gap, rule):
+    east, north = climbing('a', 0.0, 15.0, (200.0, 0.0, 50.0)), climbing(
+        'b', gap, 5.0, (gap, 200.0, 50.0))
+    first, second = checked(east, north, rule=rule).flights
+    assert max(point[2] for point in first.legs[0].points) == 50.0 + rule.vertical + 0.5
+    assert second is north
+
+
+def test_what_crosses_a_climb_leaves_the_leg_after_it_to_be_changed():
+    east, north = climbing('a', 0.0, 15.0, (200.0, 0.0, 50.0)), climbing(
+        'b', 10.5, 5.0, (10.5, 200.0, 50.0))
+    through = flight('c', (0, -30, 32), (-100, 400, 32), movable=False)
+    after = resolve((east, north, through), RULE)
+    assert [each.flights for each in after.left] == [(0, 2)]
+    assert max(point[2] for point in after.flights[0].legs[0].points) == 55.5

@@ -139,10 +139,12 @@ class _Planner:
         self._accepted = AcceptedRows(rule)
 
     def accept_fixed(self, k: int, whole: bool) -> None:
-        """Accept a flight as it is, or the leg under way of one that may change."""
+        """Accept a flight as it is, or what is under way of one that may change."""
         flight = self.flights[k]
         for n, rows in enumerate(rows_of_legs(flight, self._rule)):
             if not whole and n < len(flight.legs) and flight.legs[n].movable:
+                if n == 0:
+                    self._accepted.add(rows[:_climbed_rows(flight, rows)], (k, n))
                 return
             if whole or flight.legs:
                 self._accepted.add(rows, (k, n))
@@ -254,6 +256,8 @@ class _Planner:
                   whole: bool = True) -> bool:
         """Whether a leg is apart, and the return or path after it that cannot wait (`whole`)."""
         rows = leg_rows(flight, leg, times, self._rule, n == 0)
+        if n == 0:  # no change of the leg changes the climb
+            rows = rows[_climbed_rows(replace(flight, legs=(leg,)), rows):]
         if n + 1 == len(flight.legs):
             rows += self._stay(flight, times.end)
         if self._accepted.conflict(rows, k) is not None:
@@ -299,6 +303,15 @@ class _Planner:
             else:
                 k += 1
         return tuple(points)
+
+
+def _climbed_rows(flight: Flight, rows: Sequence[PieceRow]) -> int:
+    """Number of pieces of the first leg that are the rest of a take-off that has begun."""
+    leg = flight.legs[0]
+    if not flight.in_air or leg.top <= leg.points[0][2]:
+        return 0
+    end = rows[0][0] + flight.parts(leg, True)[0][0] if rows else 0.0
+    return sum(row[1] <= end + 1e-6 for row in rows)
 
 
 def _with_wait(path: _Change, begin: float, wait: float) -> _Change:

@@ -222,3 +222,15 @@ def test_a_wait_that_has_begun_ends_when_the_conflict_is_over():
     driver.settle(report=False)
     assert driver.lists['a'].stops[0].wait == 0.0
     assert driver.lists['a'].stops[0].begin_after == 0.0
+
+
+def test_the_leg_after_a_take_off_that_has_begun_may_get_another_height():
+    driver = AllocatorDriver(**ON)
+    climbs = {'mode': 'TAKEOFF', 'takeoff_height': 60.0, **SPEEDS}
+    driver.uav('a', 0.0, 0.0, 20.0, home=(0.0, 0.0, 0.0), **climbs)
+    driver.add(Task('t', (0.0, 300.0, 50.0), allowed_uavs={'a'}))
+    driver.settle()
+    world = driver.world
+    flight = planned_flights(world, world.lists_in_force(), driver.now)['a']
+    assert flight.legs[0].movable
+    assert flight.legs[0].points == ((0.0, 0.0, 20.0), (0.0, 300.0, 50.0))

@@ -123,7 +123,8 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         own = replace(own, waits=True, share=0.0)
     for k, stop in enumerate(each.stops):
         takes_off = k == 0 and flight.on_ground
-        under_way = k == 0 and not (flight.on_ground or own.waits) and _same_leg(published, stop)
+        under_way = k == 0 and _same_leg(published, stop) and not (
+            flight.on_ground or flight.climbing or own.waits)
         line = (*stop.leg.via, stop.entry)
         ahead = stop.line[points_passed(place, stop.line):] if under_way else line
         along = bool(stop.task.path) and not under_way  # the path is a leg of its own
@@ -142,8 +143,7 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         clock = leg_times(own, leg, clock, k == 0).end
         if along:
             stay = max(0.0, stop.task.stay + slower_along(stop, flight.pace))
-            legs.append(FlightLeg(stop.way, '', stay,
-                                  movable=False, may_wait=False))
+            legs.append(FlightLeg(stop.way, '', stay, movable=False, may_wait=False))
             clock = leg_times(own, legs[-1], clock, False).end
         place = stop.exit
         if clock > until and k + 1 < len(each.stops):
