@@ -66,6 +66,8 @@ class ListExecution:
                 and telemetry.mode is ModeFunction.MISSION):
             sender.must_start, self._watch.replacing_since = True, now
             return sender.set_mode(ModeFunction.HOLD, now)
+        if telemetry.airborne and onboard.list.leave_out_detours():
+            return self.update_mission(now)
         return onboard.begin_upload(diff, now)
 
     def _chosen_by_another(self) -> bool:

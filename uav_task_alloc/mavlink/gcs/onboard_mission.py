@@ -42,6 +42,7 @@ class OnboardMission:
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
         self.upload.is_superseded = self._overtaken
+        self.upload.may_end = lambda: not (profile.atomic and self.list.leave_out_detours())
         self.progress = ProgressTable(telemetry.frames, profile.atomic, profile.rules.loiters)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
@@ -53,18 +54,16 @@ class OnboardMission:
         self.transfer_failed = False  # the last one; the caller schedules the next attempt
         self.set_current_to: int | None = None  # seq to set, unless the upload has set it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
-        self._done_at_start: frozenset[str] = frozenset()  # at the start of the upload
+        self._at_start: object = None  # of the upload: tasks done, detour points left out
         self._reports = ReportsDuringUpload(self.progress, origin)
         self._mission, self._latest_diff = VerifiedMission(self.own, profile.atomic), LatestDiff()
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
         self._taken = False  # the vehicle has taken all items of this upload
         self._unconfirmed: tuple[MissionDiff, TaskList] | None = None  # sent; perhaps on board
-        # [s] of the vehicle's clock when all items were sent: it may fly them since then
-        self._sent_since: float | None = None
+        self._sent_since: float | None = None  # vehicle time [s]: it may fly all items since then
         self._sent_frame: int | None = None  # number of the frame received last at that time
-        self.item_time = 0.0  # [s] per item in recent uploads, smoothed
-        self.upload_started_at = 0.0  # [s]
+        self.item_time = self.upload_started_at = 0.0  # [s] per item, smoothed; of the latest
         self._completed_for: tuple[TaskList, int] | None = None
         self._flown_unset: int | None = None  # flown though `set_current_to` is not set yet
 
@@ -102,7 +101,7 @@ class OnboardMission:
     def unknown_upload(self) -> MissionDiff | None:
         """What a transfer would put on board that is not known to be taken; None: none."""
         uploading = self._unconfirmed or (None if self._taken else self._uploading)
-        return None if uploading is None else uploading[0]
+        return uploading and uploading[0]
 
     @property
     def outdated(self) -> bool:
@@ -173,7 +172,7 @@ class OnboardMission:
         self._uploading, self._taken, self.transfer_failed = (diff, self.tasks), False, False
         self.upload_started_at, self._sent_since, self._sent_frame = now, None, None
         self.list.horizon.begin()
-        self._done_at_start = self._done()
+        self._at_start = self._done(), self.list.left_out
         home = (home_item(self._telemetry.home, self._origin, self._profile.rules),) * self.own
         return self.upload.replace(Mission(
             home + diff.items, diff.start + self.own, self._profile.atomic, self.own), now)
@@ -195,7 +194,8 @@ class OnboardMission:
 
     def _overtaken(self) -> bool:
         """Whether, before another attempt, the upload is partly flown or of an older list."""
-        return self._reports.has_reached or self.outdated or self._done() != self._done_at_start
+        return self._reports.has_reached or self.outdated or self._at_start != (
+            self._done(), self.list.left_out)
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of the mission protocol; returns the messages to send."""
@@ -379,9 +379,9 @@ class OnboardMission:
                 held, known, self.tasks is not None, lambda: self._can_continue(held), now):
             return
         self.resume.keep_flown()
-        (items, since), current = self.resume.read_again(held, self.tasks), self._telemetry.current
-        current = None if current is None or not held else max(0, current - self.own)
-        self.progress.begin(items, current, now, read=True, since=since)
+        (items, since), seq = self.resume.read_again(held, self.tasks), self._telemetry.current
+        self.progress.begin(items, None if seq is None or not held else max(0, seq - self.own),
+                            now, read=True, since=since)
 
     def _can_continue(self, held: tuple[Item, ...]) -> bool:
         """Whether the list can be flown with a mission without replacing it."""

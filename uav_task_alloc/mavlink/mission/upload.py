@@ -123,6 +123,7 @@ class Upload:
         self.events: deque[Outcome] = deque()
         self.uploads = 0  # started so far
         self.is_superseded: Callable[[], bool] = lambda: False  # it would not be retried unchanged
+        self.may_end: Callable[[], bool] = lambda: True  # its last item may be sent
         self._out: list[Message] = []
         self._pending: Mission | None = None
         self._read_pending = False
@@ -232,6 +233,9 @@ class Upload:
             return
         self._read_at = -math.inf
         last = seq == len(mission.items) - 1
+        if last and not self._sent_once and not self.may_end():
+            self._go(UploadEvent.STALE, now)
+            return
         self._requested = seq
         self._sent_last = self._sent_last or last
         self._sent_once = self._sent_once or last

@@ -27,7 +27,7 @@ from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.mavlink.mission.waits import Waits
-from uav_task_alloc.mavlink.mission.way_approach import approach
+from uav_task_alloc.mavlink.mission.way_approach import approach, first_clear
 from uav_task_alloc.mavlink.mission.way_home import WayHome
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Point, Task, ThreatZone
@@ -85,6 +85,8 @@ class WantedMission:
         self._state: object = None  # what of that key and list decides the items
         self._listed: dict[str, int] = {}  # the last revision with a task that was not completed
         self._dropped: frozenset[str] = frozenset()  # completed tasks that a later list dropped
+        # list and task to which detour points are left out, and how many of the first ones
+        self.left_out: tuple[TaskList, str, int] | None = None
 
     def assign(self, tasks: TaskList) -> None:
         """Take the latest list; a refused task is tried again where it has changed."""
@@ -161,26 +163,54 @@ class WantedMission:
         progress = self._progress
         ended = tuple(progress.completed), progress.pending, tuple(self._refused)
         coverage, way_home = progress.coverage, self.way_home.key
-        key = self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest, way_home
+        left_out, horizon = self.left_out, self.horizon.stops
+        key = (self.tasks, ended, horizon, coverage.version, coverage.latest, left_out, way_home)
         if self._remaining is None or self._remaining[0] != key:
             tasks = self.tasks.without(chain.from_iterable(ended))
             tasks = replace(tasks, stops=self._rests(tasks.stops))
             tasks = self.way_home.of(tasks)
             if self.horizon.stops is not None:
                 tasks = tasks.first(self.horizon.stops)
-            rest = (self.tasks, ended, self.horizon.stops, coverage.version, coverage.latest)
-            self._remaining = (*rest, way_home), tasks
+            rest = key[:-1]
+            self._remaining = key, tasks
             state = (*rest, tasks.returns, tasks.end_via)
             if state != self._state:
                 self._state = state
         return self._remaining[1]
+
+    def leave_out_detours(self) -> bool:
+        """Leave out those detour points of the first leg to which a zone is now between.
+
+        The list was planned from where the vehicle was: in a long transfer, or while it waits
+        for a better link, it flies on by its old mission.
+
+        Returns:
+            Whether points are left out that were not before.
+        """
+        start, stops = self.leg.locate(), self.remaining().stops
+        if start is None or not stops or stops[0].task.path or not stops[0].via:
+            return False  # of a way see `approach`
+        assert self.tasks is not None
+        task, before = stops[0].task.id, self._count_left_out(stops[0])
+        first = first_clear(start.point, (*stops[0].via, stops[0].start), self.zones())
+        if not first:
+            return False  # as planned, or there is no better one
+        self.left_out = self.tasks, task, before + first
+        return True
+
+    def _count_left_out(self, stop: MissionStop) -> int:
+        """How many of the first detour points to a stop are left out."""
+        tasks, task, count = self.left_out or (None, '', 0)
+        return count if tasks is self.tasks and task == stop.task.id else 0
 
     def _rests(self, stops: tuple[MissionStop, ...]) -> tuple[MissionStop, ...]:
         """Stops with what is left of their ways, and with the points on which it is reached."""
         rests = [self._progress.coverage.rest(stop) for stop in stops]
         return tuple(
             self._reached(stop, rests[n - 1].end if n else None)
-            if stop.task.path and (stop.begun or n == 0) else stop
+            if stop.task.path and (stop.begun or n == 0) else
+            replace(stop, via=stop.via[self._count_left_out(stop):])
+            if n == 0 and self.left_out is not None else stop
             for n, stop in enumerate(rests))
 
     def _reached(self, stop: MissionStop, before: Point | None) -> MissionStop:

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import accumulate, pairwise
 
+from uav_task_alloc.geometry.level_paths import zone_at_heights
 from uav_task_alloc.geometry.polyline import nearest_on_segment, segment_fraction
 from uav_task_alloc.geometry.zones_on_path import zones_across_path
 from uav_task_alloc.model import Point, ThreatZone
@@ -49,6 +51,23 @@ def approach(via: tuple[Point, ...], place: Point | None, way: Sequence[Point], 
     if begin <= _NOW or (via and _is_clear(via[-1], target, zones)):
         return via
     return (*via, *_points(way, _NOW, begin))
+
+
+def first_clear(place: Point, points: Sequence[Point],
+                zones: Iterable[ThreatZone]) -> int | None:
+    """Return which point of a planned leg is to be flown to from elsewhere than planned.
+
+    Args:
+        place: where the vehicle is [m] ENU.
+        points: detour points and end of the leg [m] ENU.
+        zones: in force; without their margins, which a plan keeps, but no vehicle exactly.
+
+    Returns:
+        The index of the first one to which no zone is between; None: it is none.
+    """
+    bare = [replace(zone, margin=0.0) for zone in zones]
+    return next((n for n, point in enumerate(points) if zone_at_heights(
+        place, point, min(place[2], point[2]), max(place[2], point[2]), bare) is None), None)
 
 
 def _is_clear(a: Point, b: Point, zones: Iterable[ThreatZone]) -> bool:
