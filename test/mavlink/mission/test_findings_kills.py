@@ -247,3 +247,22 @@ def test_a_task_passed_before_a_reboot_is_known_though_the_mission_was_read_afte
     rebooted.append(bench.now)
     assert bench.run(lambda: bench.completed() == ['A'], 40.0)
     assert noticed() is not read_first
+
+
+@ARDUPILOT
+@pytest.mark.parametrize('names', ['A', 'AB'])
+def test_a_task_reached_without_a_position_while_its_mission_is_not_read_is_known(kind, names):
+    bench = flying(kind, names)
+    bench.run(lambda: distance(bench, AT_A) < 10.0)
+    bench.vehicles[1].failsafe('ekf', None)
+    bench.run(limit=0.2)
+    bench.kill_and_restart(0.0)
+    bench.assign(task_list(names, 2))
+    assert bench.run(lambda: places(bench) == ['A'], 20.0)
+    bench.run(limit=1.0)
+    if names == 'A':  # it was the last one
+        bench.vehicles[1].rc_mode(MODES[kind].rtl)
+    bench.run(limit=6.0)
+    assert bench.completed() == []
+    bench.vehicles[1].failsafe_over()
+    assert bench.run(lambda: bench.completed() == ['A'], 10.0)

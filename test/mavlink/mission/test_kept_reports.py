@@ -20,3 +20,27 @@ def test_each_kept_reached_is_judged_once_while_an_upload_takes_long(monkeypatch
             flight.stay(0.2)
             reports.step(new, flight.now)
     assert judged == [0, 1]
+
+
+def test_a_repetition_that_began_before_an_upload_is_not_of_its_mission():
+    flight = Flight()
+    flight.begin(A=50.0, X=900.0)
+    flight.fly_to(50.0)
+    flight.reached(0)
+    flight.begin(C=157.0, X=900.0)  # taken at A, whose REACHED is repeated until it is at C
+    for _ in range(10):
+        flight.stay(1.0, 10.0)
+        flight.reached(0)
+    flight.fly_to(157.0)
+    flight.reached(0)
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    flight.stay(0.4)
+    begin = flight.now
+    reports, new = upload_during(flight, E=44.0, X=-900.0)
+    flight.stay(1.0)
+    reports.add_reached(0, flight.now, flight.frame())
+    of_new = reports.begin_new(new)
+    flight.table.begin(new.items, 0, flight.now, since=begin)
+    reports.replay(of_new, 0, None)
+    flight.stay(10.0)
+    assert list(flight.table.completed) == ['A', 'C']

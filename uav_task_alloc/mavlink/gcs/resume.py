@@ -16,7 +16,7 @@ from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
-from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReports
+from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReached, UnreadReports
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import (
     Item,
@@ -125,8 +125,12 @@ class Resume:
 
     def _credit_unread(self, held: tuple[Item, ...], now: float) -> None:
         """Credit each REACHED received before the mission was read, by the positions."""
-        self._credit(tuple(
-            held[each.seq] for each in self._unread.take_reached(self._placed(held))), now)
+        self._credit(tuple(held[each.seq] for each in self._take_reached(held)), now)
+
+    def _take_reached(self, held: tuple[Item, ...]) -> list[UnreadReached]:
+        mission, recorded, _ = self.recorded
+        return self._unread.take_reached(
+            self._placed(held), recorded if mission == checksum(held) else None)
 
     def awaits_position(self, held: tuple[Item, ...], read_at: float, now: float) -> bool:
         """Whether what locates the vehicle is still to come; on the ground nothing is needed.
@@ -266,8 +270,7 @@ class Resume:
         """Pass on what was received until the mission was read, in the order it was sent."""
         rows: list[tuple[int, int, int, float]] = [
             (each.frame, 1, each.seq, each.at) for each in self._unread.currents[1:]]
-        rows += [(each.frame, 0, each.seq, each.at)
-                 for each in self._unread.take_reached(self._placed(held))]
+        rows += [(each.frame, 0, each.seq, each.at) for each in self._take_reached(held)]
         for frame, kind, seq, when in sorted(rows):
             if kind:
                 self._progress.note_current(seq, when, True, frame)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
-from uav_task_alloc.mavlink.autopilots import ModeFunction
+from pymavlink.dialects.v20 import ardupilotmega as d
+
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.passed_items import flown_between
@@ -27,6 +28,7 @@ class UnreadCurrent(NamedTuple):
     at: float  # [s] received
     frame: int  # its number
     flying: bool  # in mission mode, so that it is of the mission that is flown
+    complete: bool  # with the report that the mission is flown to its end
 
 
 @dataclass(slots=True)
@@ -91,7 +93,8 @@ class UnreadReports:
         """
         if not located and len(self.currents) < _MAX_CURRENTS:
             self.currents.append(UnreadCurrent(
-                seq, now, frame, self._telemetry.mode is ModeFunction.MISSION))
+                seq, now, frame, self._telemetry.in_mission,
+                self._telemetry.mission_state == d.MISSION_STATE_COMPLETE))
         for reached in self._reached:
             if frame > reached.frame:
                 reached.current_after = max(seq, reached.current_after or 0)
@@ -118,16 +121,19 @@ class UnreadReports:
             self._before = self.currents, deepcopy(self._positions)
             self.currents = []
 
-    def take_reached(self, held: tuple[Item, ...]) -> list[UnreadReached]:
+    def take_reached(self, held: tuple[Item, ...], recorded: int | None) -> list[UnreadReached]:
         """Take each REACHED that can be of the mission on board, and drop all.
 
         Args:
             held: the items on board, with their positions, without home.
+            recorded: current item of the previous run of the bridge; None: it was of another
+                mission, or is not known.
 
         Returns:
             Those of the mission on board.
         """
-        reached = [each for each in self._reached if self._is_of(each, held)]
+        reached = [each for each in self._reached if self._is_of(each, held) or (
+            recorded is not None and each.place is None and self._is_in_turn(each, recorded))]
         self._reached.clear()
         return reached
 
@@ -156,6 +162,16 @@ class UnreadReports:
         """
         before, self._before = self._before, None
         return set() if before is None else _passed(*before, held, home)
+
+    def _is_in_turn(self, reached: UnreadReached, recorded: int) -> bool:
+        """Whether it came between reports of its item and of what follows as the current item.
+
+        It shows that without a position, too, as in an EKF failsafe; PX4's repetitions do not.
+        """
+        before = [each.seq for each in self.currents if each.frame < reached.frame]
+        after = [each for each in self.currents if each.frame > reached.frame][:1]
+        return not self._repeats and (before or [recorded])[-1] == reached.seq and any(
+            each.flying and each.seq == reached.seq + (not each.complete) for each in after)
 
     def _is_of(self, reached: UnreadReached, held: tuple[Item, ...]) -> bool:
         """Whether a REACHED can be of the mission on board, by the current item and the place."""

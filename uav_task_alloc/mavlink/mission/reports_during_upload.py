@@ -27,6 +27,7 @@ class _Reached(NamedTuple):
     frame: int  # number of the first frame that was kept
     last: float  # [s] the last one was received
     last_frame: int  # its number
+    kept_at: float  # [s] the first one was received that was kept
 
 
 class _Current(NamedTuple):
@@ -73,7 +74,7 @@ class ReportsDuringUpload:
         if repeated:
             self._reached[-1] = self._reached[-1]._replace(last=now, last_frame=frame)
         elif len(self._reached) < _MAX_MESSAGES:
-            self._reached.append(_Reached(seq, frame, now, frame))
+            self._reached.append(_Reached(seq, frame, now, frame, now))
         self._progress.note_end(seq, now)
 
     def add_current(self, seq: int, now: float, frame: int, flying: bool, plan: int) -> None:
@@ -129,9 +130,9 @@ class ReportsDuringUpload:
         Returns:
             [s] at which it was received, where it is of the new mission.
         """
-        seq, frame, last, last_frame = reached
+        seq, frame, last, last_frame, kept_at = reached
         progress, first = self._progress, self._first_at(reached)
-        if progress.may_repeat_earlier(seq, last, last_frame):
+        if first < kept_at or progress.may_repeat_earlier(seq, last, last_frame):
             return self._credit_repeated(reached, before, after, uploaded.start)
         if before is not None and self._was_at(before, reached, len(progress.items)):
             progress.note_reached(seq, first, proven=True, frame=frame)
