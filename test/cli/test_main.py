@@ -165,6 +165,13 @@ def test_an_error_is_one_line_and_status_1(arguments, text, capsys):
     assert refusal.count('\n') == 1
 
 
+@pytest.mark.parametrize('path', [FILE, DELIVERIES])
+def test_an_unknown_solver_is_refused_before_anything_is_compiled(path, monkeypatch, capsys):
+    monkeypatch.setattr('uav_task_alloc.cli.plan._load_kernels', lambda *_, **__: 1 / 0)
+    assert cli.main(['plan', path, '--solver', 'bee']) == 1
+    assert capsys.readouterr().err.startswith("solver 'bee': expected one of chain_q, ")
+
+
 def test_ctrl_c_before_the_solving_is_one_line(monkeypatch, capsys):
     def interrupted(argv):
         raise KeyboardInterrupt

@@ -28,7 +28,7 @@ from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
 from uav_task_alloc.cli.plan_terrain import check_ground, plan_over_terrain
 from uav_task_alloc.cli.plan_times import has_times, times_text
 from uav_task_alloc.cli.progress import SolveProgress, log_line
-from uav_task_alloc.errors import InvalidValue, first_of
+from uav_task_alloc.errors import InvalidValue, UnknownName, first_of
 from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
 from uav_task_alloc.params import AllocatorParams
@@ -49,6 +49,7 @@ def main(argv: Sequence[str]) -> int:
     """
     args = _make_parser().parsed(argv)
     check_outputs(args)
+    _check_solver(args.solver)
     given = with_options(without_cancelled(scenario.load(args.scenario)), args)
     terrain = read_terrain(args.terrain, given.origin) if args.terrain else None
     loaded = with_pieces(given, terrain)
@@ -85,6 +86,13 @@ def _answer(loaded: Scenario, result: Plan, args: argparse.Namespace) -> None:
             print(times_text([uav.uav for uav in loaded.uavs], tasks, result), flush=True)
     finally:  # also where nobody reads what is printed
         write_outputs(loaded, result, args)
+
+
+def _check_solver(name: str) -> None:
+    """Refuse a name before anything is compiled for it. Raises UnknownName."""
+    from uav_task_alloc.solver.registry import SOLVERS  # imports numba
+    if name not in SOLVERS:
+        raise UnknownName('solver', name, list(SOLVERS))
 
 
 def _load_kernels(loaded: Scenario, solver: str, search: bool = True) -> None:
