@@ -230,8 +230,8 @@ class Judge:
         if message.get_type() == 'COMMAND_LONG' and (
                 message.command == d.MAV_CMD_COMPONENT_ARM_DISARM):
             self._commanded_arm = now
-            if self._taken_by_arm and self.known_at is None:
-                self.taken_at = None  # both have armed it, in unknown order
+            if self._taken_by_arm and (self.known_at is None or now <= self.known_at):
+                self.taken_at = self.known_at = None  # both have armed it, in unknown order
         if message.get_type() == 'COMMAND_LONG' and message.command == d.MAV_CMD_DO_SET_MODE:
             main, sub = int(message.param2), int(message.param3)
             self._commanded[main << 16 | sub << 24 if self.family == 'px4' else main] = now

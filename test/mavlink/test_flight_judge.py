@@ -209,6 +209,16 @@ def test_a_disarming_is_no_news_where_no_frame_has_shown_it_armed(shown, overrid
     assert bool(counts['overridden']) is overridden
 
 
+@pytest.mark.parametrize(('seconds', 'overridden'), [(0.0, False), (0.2, True)])
+def test_an_arming_that_the_bridge_commands_as_the_news_arrives_is_of_both(seconds, overridden):
+    counts = judged([
+        (1.0, [('armed', 'pilot', None)], None, None),
+        (2.0, [], heartbeat(True), None if seconds else arm_command()),
+        (2.0 + seconds, [], None, arm_command() if seconds else None),
+        (3.0, [], heartbeat(True), arm_command())])
+    assert bool(counts['overridden']) is overridden
+
+
 @pytest.mark.parametrize(('seconds', 'overridden'), [(0.0, False), (0.3, True)])
 def test_a_mode_that_ends_before_a_frame_can_show_it_is_no_news(seconds, overridden):
     counts = judged([
