@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is still to be judged when the bridge is killed, or another mission is read, is known."""
+from types import SimpleNamespace
+
 import pytest
 from authority_bench import ARDUPILOT, BOTH, MODES, PX4, flying
 from evidence_bench import Flight
@@ -8,8 +10,11 @@ from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReports
 from uav_task_alloc.mavlink.mission.flown_path import FlownPath
+from uav_task_alloc.mavlink.mission.item import Item
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
+from uav_task_alloc.mavlink.mission.position_history import PositionHistory
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.model import Task
@@ -204,9 +209,9 @@ def test_a_mission_that_ended_before_its_appended_items_came_is_started_after_a_
 
 
 @ARDUPILOT
-@pytest.mark.parametrize(('metres', 'known'), [(16.0, True), (45.0, False)])
+@pytest.mark.parametrize('metres', [16.0, 45.0])
 def test_a_reached_before_the_first_position_is_of_a_place_from_which_it_can_have_flown_since(
-        kind, metres, known):
+        kind, metres):
     bench, at_b = flying(kind, 'ABCD'), (100.0, 100.0, 50.0)
     assert bench.run(lambda: places(bench) == ['A'])
     bench.run(lambda: distance(bench, at_b) < 10.0)
@@ -217,7 +222,28 @@ def test_a_reached_before_the_first_position_is_of_a_place_from_which_it_can_hav
     bench.assign(task_list('BCD', 2))
     assert bench.run(lambda: distance(bench, at_b) > 60.0, 30.0)
     bench.run(limit=4.0)
-    assert ('B' in bench.completed()) is known
+    assert 'B' in bench.completed()
+
+
+@pytest.mark.parametrize(('metres', 'seconds', 'after', 'known'), [
+    (45.0, 4.0, 1, True),
+    (75.0, 4.0, 1, False),  # too far for its speed
+    (45.0, 4.0, 2, False),  # another station has set the current item
+    (45.0, 11.0, 1, False),
+])
+def test_a_position_of_long_after_a_reached_counts_where_the_current_items_agree(
+        metres, seconds, after, known):
+    telemetry = SimpleNamespace(has_position=False, position=(metres, 0.0, 50.0), speed=10.0,
+                                in_mission=True, mission_state=d.MISSION_STATE_ACTIVE)
+    reports = UnreadReports(telemetry, PositionHistory(), repeats=False)
+    reports.note_current(0, 0.0, 1, located=False)
+    reports.note_reached(0, 1.0, 2)
+    reports.note_current(after, 1.5, 3, located=False)
+    telemetry.has_position = True
+    item = Item(d.MAV_CMD_NAV_WAYPOINT, d.MAV_FRAME_GLOBAL_INT, 0, 0, 50.0,
+                position=(0.0, 0.0, 50.0), radius=2.0)
+    taken = reports.take_reached((item,) * 3, None, 1.0 + seconds)
+    assert [each.seq for each in taken] == [0] * known
 
 
 @BOTH

@@ -125,12 +125,12 @@ class Resume:
 
     def _credit_unread(self, held: tuple[Item, ...], now: float) -> None:
         """Credit each REACHED received before the mission was read, by the positions."""
-        self._credit(tuple(held[each.seq] for each in self._take_reached(held)), now)
+        self._credit(tuple(held[each.seq] for each in self._take_reached(held, now)), now)
 
-    def _take_reached(self, held: tuple[Item, ...]) -> list[UnreadReached]:
+    def _take_reached(self, held: tuple[Item, ...], now: float) -> list[UnreadReached]:
         mission, recorded, _ = self.recorded
         return self._unread.take_reached(
-            self._placed(held), recorded if mission == checksum(held) else None)
+            self._placed(held), recorded if mission == checksum(held) else None, now)
 
     def awaits_position(self, held: tuple[Item, ...], read_at: float, now: float) -> bool:
         """Whether what locates the vehicle is still to come; on the ground nothing is needed.
@@ -256,7 +256,7 @@ class Resume:
         items = held[:current] + self._tasks.tagged(held[current:], tasks)
         progress.begin(items, current, now, read=True)
         self._epoch, self._located_at = progress.epoch, recorded
-        self._replay(held)
+        self._replay(held, now)
 
     def _flown_since(self, held: tuple[Item, ...], begin: int, end: int, now: float) -> set[int]:
         """Indices in [begin, end) at which the vehicle was until steady time `now` [s]."""
@@ -266,11 +266,11 @@ class Resume:
         return flown_between(self._placed(held), begin, end, now, frame,
                              self._progress.positions, self._home_of(held))
 
-    def _replay(self, held: tuple[Item, ...]) -> None:
+    def _replay(self, held: tuple[Item, ...], now: float) -> None:
         """Pass on what was received until the mission was read, in the order it was sent."""
         rows: list[tuple[int, int, int, float]] = [
             (each.frame, 1, each.seq, each.at) for each in self._unread.currents[1:]]
-        rows += [(each.frame, 0, each.seq, each.at) for each in self._take_reached(held)]
+        rows += [(each.frame, 0, each.seq, each.at) for each in self._take_reached(held, now)]
         for frame, kind, seq, when in sorted(rows):
             if kind:
                 self._progress.note_current(seq, when, True, frame)

@@ -19,6 +19,7 @@ from uav_task_alloc.model import Point
 _MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
 _MAX_REACHED = 32  # REACHED kept until then
 _PLACE_DELAY = 2.0  # [s] after a REACHED in which a position still shows its place
+_LATE_PLACE = 10.0  # [s] the same, where the reports of the current item agree
 
 
 class UnreadCurrent(NamedTuple):
@@ -41,6 +42,7 @@ class UnreadReached:
     place: Point | None  # [m] ENU of the vehicle; None: not known
     current_after: int | None = None  # the largest current item reported since
     flown_since: float = 0.0  # [m] that it may have flown from the item to `place`
+    late: bool = False  # `place` is of later than _PLACE_DELAY
 
     def place_later(self, place: Point, speed: float, now: float) -> None:
         """Take a position that came after the REACHED, as none had come before.
@@ -50,7 +52,7 @@ class UnreadReached:
             speed: of the vehicle [m/s]; NaN: not known.
             now: steady time [s].
         """
-        self.place = place
+        self.place, self.late = place, now - self.at >= _PLACE_DELAY
         self.flown_since = 0.0 if math.isnan(speed) else speed * (now - self.at)
 
     def may_be_of(self, held: tuple[Item, ...], repeats: bool) -> bool:
@@ -98,9 +100,7 @@ class UnreadReports:
         for reached in self._reached:
             if frame > reached.frame:
                 reached.current_after = max(seq, reached.current_after or 0)
-            if reached.place is None and self._telemetry.has_position and (
-                    now - reached.at < _PLACE_DELAY):
-                reached.place_later(self._telemetry.position, self._telemetry.speed, now)
+        self._place(now)
 
     def note_reached(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_ITEM_REACHED.
@@ -115,25 +115,39 @@ class UnreadReports:
             self._reached.append(
                 UnreadReached(seq, now, frame, self._telemetry.position if known else None))
 
+    def _place(self, now: float) -> None:
+        """Give each REACHED that came before any position the present one."""
+        for reached in self._reached if self._telemetry.has_position else ():
+            if reached.place is None and now - reached.at < _LATE_PLACE:
+                reached.place_later(self._telemetry.position, self._telemetry.speed, now)
+
     def restarted(self) -> None:
         """Keep what was received before a restart of the vehicle, with the positions of then."""
         if self.currents:
             self._before = self.currents, deepcopy(self._positions)
             self.currents = []
 
-    def take_reached(self, held: tuple[Item, ...], recorded: int | None) -> list[UnreadReached]:
+    def take_reached(self, held: tuple[Item, ...], recorded: int | None,
+                     now: float) -> list[UnreadReached]:
         """Take each REACHED that can be of the mission on board, and drop all.
 
         Args:
             held: the items on board, with their positions, without home.
             recorded: current item of the previous run of the bridge; None: it was of another
                 mission, or is not known.
+            now: steady time [s].
 
         Returns:
             Those of the mission on board.
         """
-        reached = [each for each in self._reached if self._is_of(each, held) or (
-            recorded is not None and each.place is None and self._is_in_turn(each, recorded))]
+        self._place(now)
+        reached = []
+        for each in self._reached:
+            placed, in_turn = each.place is not None and not each.late, self._is_in_turn(
+                each, recorded)
+            if (self._is_of(each, held) and (placed or in_turn or each.place is None)) or (
+                    recorded is not None and not placed and in_turn):
+                reached.append(each)
         self._reached.clear()
         return reached
 
@@ -163,14 +177,15 @@ class UnreadReports:
         before, self._before = self._before, None
         return set() if before is None else _passed(*before, held, home)
 
-    def _is_in_turn(self, reached: UnreadReached, recorded: int) -> bool:
+    def _is_in_turn(self, reached: UnreadReached, recorded: int | None) -> bool:
         """Whether it came between reports of its item and of what follows as the current item.
 
         It shows that without a position, too, as in an EKF failsafe; PX4's repetitions do not.
         """
         before = [each.seq for each in self.currents if each.frame < reached.frame]
         after = [each for each in self.currents if each.frame > reached.frame][:1]
-        return not self._repeats and (before or [recorded])[-1] == reached.seq and any(
+        known = before[-1] if before else recorded
+        return not self._repeats and known == reached.seq and any(
             each.flying and each.seq == reached.seq + (not each.complete) for each in after)
 
     def _is_of(self, reached: UnreadReached, held: tuple[Item, ...]) -> bool:
