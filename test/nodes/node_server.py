@@ -9,10 +9,10 @@ themselves.
 import gc
 import json
 import os
-import select
 import signal
 import subprocess
 import sys
+import time
 from importlib import import_module
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -44,23 +44,21 @@ class Forked:
     def __init__(self, server, argv, log):
         self.args, self.returncode, self._server = argv, None, server
         self.pid = server.ask(argv=argv, log=str(log), env=dict(os.environ), folder=os.getcwd())
-        self._end = os.pidfd_open(self.pid)  # readable once the process has ended
 
     def poll(self):
         """Exit status; None while it runs."""
-        if self.returncode is None and self._has_ended(0.0):
+        if self.returncode is None:
             self.returncode = self._server.ask(ended=self.pid)
-            os.close(self._end)
         return self.returncode
 
     def wait(self, timeout=None):
         """Exit status, after at most `timeout` [s]."""
-        if self.returncode is None and not self._has_ended(timeout):
-            raise subprocess.TimeoutExpired(self.args, timeout)
-        return self.poll()
-
-    def _has_ended(self, timeout):
-        return bool(select.select([self._end], [], [], timeout)[0])
+        end = time.monotonic() + (timeout or 0.0)
+        while self.poll() is None:
+            if timeout is not None and time.monotonic() > end:
+                raise subprocess.TimeoutExpired(self.args, timeout)
+            time.sleep(0.01)
+        return self.returncode
 
     def send_signal(self, number):
         """Send it, unless the process has ended."""
@@ -85,21 +83,12 @@ def load(argv):
         from uav_task_alloc.params import AllocatorParams
         from uav_task_alloc.solver.solve import plan
         compile_kernels(plan, AllocatorParams())
-    for module in list(sys.modules.values()):
-        if module.__name__.endswith(('.msg', '.srv')):
-            load_type_supports(module)
-
-
-def load_type_supports(module):
-    """Load what converts the messages of a module, which each node would load for its own."""
-    for kind in map(type, vars(module).values()):
-        if hasattr(kind, '__import_type_support__') and kind._TYPE_SUPPORT is None:
-            kind.__import_type_support__()
 
 
 def status(pid):
-    """Exit status of a fork that has ended."""
-    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    """Exit status of a fork, or None."""
+    ended, code = os.waitpid(pid, os.WNOHANG)
+    return os.waitstatus_to_exitcode(code) if ended else None
 
 
 def serve():
