@@ -244,6 +244,13 @@ def upload_during(flight, **places):
         DiffKind.REPLACE, items_at(**places), 0)
 
 
+def confirm(flight, reports, new, begin, plan=0):
+    """The upload is confirmed: the vehicle may fly the new mission since `begin` [s]."""
+    of_new = reports.begin_new(new)
+    flight.table.begin(new.items, 0, flight.now, since=begin)
+    reports.replay(of_new, plan, None)
+
+
 def test_a_kept_reached_counts_however_far_the_vehicle_has_flown_since():
     flight = Flight()
     flight.begin(A=100.0, X=900.0)
@@ -265,9 +272,7 @@ def test_a_kept_current_item_of_the_new_mission_counts():
     flight.stay(0.2, 10.0)
     reports.add_current(1, flight.now, flight.frame(), True, 7)
     flight.fly_to(200.0)
-    of_new = reports.begin_new(new)
-    flight.table.begin(new.items, 0, flight.now, since=begin)
-    reports.replay(of_new, 7, None)
+    confirm(flight, reports, new, begin, 7)
     flight.stay(10.0)
     assert list(flight.table.completed) == ['B']
 
@@ -283,9 +288,7 @@ def test_a_reached_is_of_the_item_that_was_current_until_then(current, completed
         reports.add_current(0, flight.now, flight.frame(), True, 0)
     flight.fly_to(160.0)
     reports.add_reached(0, flight.now, flight.frame())
-    of_new = reports.begin_new(new)
-    flight.table.begin(new.items, 0, flight.now, since=begin)
-    reports.replay(of_new, 0, None)
+    confirm(flight, reports, new, begin)
     flight.fly_to(200.0)
     assert list(flight.table.completed) == completed
 

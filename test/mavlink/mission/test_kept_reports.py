@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reports that are kept during a long upload are judged once each."""
 from evidence_bench import Flight
-from test_findings_uploads import upload_during
+from test_findings_uploads import confirm, upload_during
 
 from uav_task_alloc.mavlink.mission.reports_during_upload import ReportsDuringUpload
 
@@ -39,8 +39,6 @@ def test_a_repetition_that_began_before_an_upload_is_not_of_its_mission():
     reports, new = upload_during(flight, E=44.0, X=-900.0)
     flight.stay(1.0)
     reports.add_reached(0, flight.now, flight.frame())
-    of_new = reports.begin_new(new)
-    flight.table.begin(new.items, 0, flight.now, since=begin)
-    reports.replay(of_new, 0, None)
+    confirm(flight, reports, new, begin)
     flight.stay(10.0)
     assert list(flight.table.completed) == ['A', 'C']
