@@ -69,6 +69,31 @@ def test_a_task_passed_in_a_cut_in_which_the_mission_was_left_survives_a_kill(ki
 
 
 @BOTH
+@pytest.mark.parametrize('flown', [True, False])
+def test_a_task_passed_in_a_cut_in_which_the_bridge_was_killed_and_the_mission_left_is_known(
+        kind, flown):
+    bench = flying(kind, 'ABC')
+    bench.run(lambda: distance(bench, AT_A) < 20.0)
+    bench.line.cut = True
+    if flown:
+        assert bench.run(lambda: places(bench) == ['A'], 20.0)
+    bench.run(limit=0.4)
+    bench.vehicles[1].failsafe('radio', MODES[kind].land)
+    bench.run(limit=4.0)
+    bench.line.cut = False
+    bench.kill_and_restart(0.0)
+    bench.assign(task_list('ABC', 2))
+    assert bench.run(lambda: bench.onboard().resume.located, 20.0)
+    bench.run(limit=2.0)
+    assert bench.completed() == ['A'] * flown
+    bench.vehicles[1].failsafe_over()
+    assert bench.run(lambda: not bench.executor().telemetry.airborne, 30.0)
+    bench.run(limit=8.0)
+    bench.hand_over()
+    flown_once_each(bench, 'ABC')
+
+
+@BOTH
 @pytest.mark.parametrize('place', ['after', 'at'])
 def test_tasks_passed_at_once_survive_a_kill_before_they_are_judged(kind, place):
     bench = flying(kind, 'ABC')

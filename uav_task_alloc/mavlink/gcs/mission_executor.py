@@ -123,12 +123,12 @@ class MissionExecutor:
             for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
                 t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
                 resume.note_seen(PositionSample(t, (x, y, z), (east, north, up)))
-            resume.was_disarmed = not record.armed
+            resume.was_disarmed, resume.was_in_mission = not record.armed, (
+                self.profile.mode_function(record.mode or 0) is ModeFunction.MISSION)
             # the current item may be of the replaced mission, or set by another party
             resume.current_unreliable = (
                 record.replacing_since is not None and not self.profile.atomic) or (
-                record.state is AuthorityState.LOST
-                and self.profile.mode_function(record.mode or 0) is not ModeFunction.MISSION)
+                record.state is AuthorityState.LOST and not resume.was_in_mission)
         for mark in self.watch.marks.values():
             resume.note_mark(mark.task, mark[1:4], mark.flown)
 

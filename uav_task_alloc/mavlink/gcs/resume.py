@@ -68,6 +68,7 @@ class Resume:
         self._seen: tuple[PositionSample, ...] = ()  # the last positions of the previous run
         self.recorded_upload: tuple[int, ...] = ()  # checksum and first item of an upload then
         self.was_disarmed = True  # in the last record; or there is none
+        self.was_in_mission = False  # in the last record
         self.cruise: Callable[[], float] = lambda: math.nan  # [m/s]; NaN: not known
         self._missions: tuple[tuple[Item, ...], ...] = ()  # read so far
         self.current_unreliable = False  # items before the current one may be unflown
@@ -248,7 +249,9 @@ class Resume:
         self._old, self._until = held[:recorded], now + MAX_AGE
         # what was passed before is judged by the positions of before
         begin = min(max(recorded, *self.passed[1:2], 0), current)
-        flown = self._flown_since(held, begin, current, when)
+        left_unseen = self.was_in_mission and not first.flying and (
+            self._telemetry.mode is not ModeFunction.MISSION)
+        flown = self._flown_since(held, begin, current, when, left_unseen)
         if arrived and current > recorded:
             flown |= {recorded}
         passed = tuple(held[n] for n in sorted(flown))
@@ -258,13 +261,14 @@ class Resume:
         self._epoch, self._located_at = progress.epoch, recorded
         self._replay(held, now)
 
-    def _flown_since(self, held: tuple[Item, ...], begin: int, end: int, now: float) -> set[int]:
+    def _flown_since(self, held: tuple[Item, ...], begin: int, end: int, now: float,
+                     left_unseen: bool = False) -> set[int]:
         """Indices in [begin, end) at which the vehicle was until steady time `now` [s]."""
         if begin == end or not self._unread.currents:
             return set()
         frame = max(each.frame for each in self._unread.currents if each.at <= now)
         return flown_between(self._placed(held), begin, end, now, frame,
-                             self._progress.positions, self._home_of(held))
+                             self._progress.positions, self._home_of(held), left_unseen)
 
     def _replay(self, held: tuple[Item, ...], now: float) -> None:
         """Pass on what was received until the mission was read, in the order it was sent."""

@@ -203,7 +203,8 @@ def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:
 
 
 def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, frame: int,
-                  positions: PositionHistory, home: Point | None = None) -> set[int]:
+                  positions: PositionHistory, home: Point | None = None,
+                  left_unseen: bool = False) -> set[int]:
     """Judge the items that were passed while no bridge ran; no evidence of them will come.
 
     Args:
@@ -214,13 +215,14 @@ def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, fra
         frame: its number.
         positions: of the vehicle.
         home: [m] ENU, where it returns to after the last item; None: it does not, or not known.
+        left_unseen: whether it has left mission mode in a gap of the positions.
 
     Returns:
         Indices of those that were flown.
     """
     claim = replace(_numbered_claim(items, begin, end, home),
                     until=positions.vehicle_time(now), frame=frame)
-    judged = PassedItems(FrameLog(), positions).judge(claim, claim.items, now)
+    judged = PassedItems(FrameLog(), positions).judge(claim, claim.items, now, left_unseen)
     return {int(item.task) for item in judged.flown}
 
 
