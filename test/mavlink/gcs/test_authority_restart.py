@@ -271,15 +271,71 @@ def test_killed_in_a_climb_it_stays_held_and_flies_its_list(kind, height):
     assert bench.executor().authority.state is H
 
 
-@PX4
-def test_a_climb_that_ended_while_no_bridge_ran_is_a_loss(kind):
+def killed_in_climb(kind, height):
+    """Killed while it takes off, at this height [m]."""
     bench = AuthorityBench(kind).discover()
     bench.assign(task_list('AB'))
-    assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] > 20.0, 60.0)
-    bench.kill_and_restart(30.0)
-    bench.run(limit=1.0)
+    assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] > height, 60.0)
+    bench.kill()
+    return bench
+
+
+@PX4
+@pytest.mark.parametrize(('height', 'seconds'), [(2.0, 60.0), (20.0, 30.0), (45.0, 10.0)])
+def test_a_climb_that_ended_while_no_bridge_ran_leaves_it_held(kind, height, seconds):
+    bench = killed_in_climb(kind, height)
+    bench.run(limit=seconds)
+    assert bench.vehicles[1].flight.custom_mode == MODES[kind].hold
+    bench.start()
+    bench.discover()
+    assert bench.reaches(H, 5.0)
+    assert status_is(bench, H, 'the vehicle is in Hold')
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 100.0)
+
+
+@PX4
+@pytest.mark.parametrize('speed', [(3.0, 0.0, 0.0), (0.0, 0.0, 3.0), (0.0, 0.0, -3.0)])
+def test_a_climb_after_which_somebody_moved_it_while_no_bridge_ran_is_a_loss(kind, speed):
+    bench = killed_in_climb(kind, 20.0)
+    bench.run(limit=20.0)
+    vehicle = bench.vehicles[1]
+    vehicle.rc_mode(MODES[kind].stick)
+    vehicle.rc_stick(speed)
+    bench.run(limit=3.0)
+    vehicle.rc_stick(None)
+    bench.run(limit=3.0)
+    vehicle.rc_mode(MODES[kind].hold)
+    bench.start()
+    bench.discover()
+    assert bench.reaches(L, 5.0)
     assert status_is(bench, L, 'the vehicle is in Hold')
+    assert sends_no_command(bench, names='AB')
+
+
+@PX4
+@pytest.mark.parametrize('missing', ['GLOBAL_POSITION_INT', 'HOME_POSITION'])
+def test_a_climb_whose_end_is_not_shown_after_a_restart_is_a_loss(kind, missing):
+    bench = killed_in_climb(kind, 20.0)
+    bench.run(limit=20.0)
+    bench.line.tampers.append(lambda direction, m, now: [] if m.get_type() == missing else None)
+    bench.start()
+    bench.discover()
+    bench.run(limit=8.0)
+    assert bench.authority() is S
+    assert bench.reaches(L, 5.0)
     assert bench.hand_over() == ''
+
+
+@PX4
+def test_a_climb_that_is_ended_while_no_bridge_runs_below_its_height_is_a_loss(kind):
+    bench = killed_in_climb(kind, 10.0)
+    bench.vehicles[1].rc_mode(MODES[kind].hold)
+    bench.run(limit=10.0)
+    bench.start()
+    bench.discover()
+    assert bench.reaches(L, 5.0)
+    assert sends_no_command(bench, names='AB')
 
 
 @PX4

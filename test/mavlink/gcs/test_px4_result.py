@@ -19,13 +19,15 @@ def taken_off(names):
     return bench
 
 
-def test_a_restarted_bridge_after_a_take_off_completes_no_task():
+def test_a_restarted_bridge_after_a_take_off_completes_no_task_before_it_is_flown():
     bench = taken_off('ABC')
     bench.start()
     bench.discover()
     bench.assign(task_list('ABC', 2))
-    bench.run(limit=20.0)
-    assert bench.completed() == []
+    assert bench.run(lambda: bool(bench.completed()))
+    assert places(bench) == bench.completed() == ['A']
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
+    assert places(bench) == ['A', 'B', 'C']
 
 
 def test_a_restarted_bridge_after_a_landing_completes_no_task():

@@ -77,7 +77,7 @@ class AuthorityEvent(Enum):
     BATTERY_CHANGED = 'fuller battery after a reboot on the ground, which followed a landing of ' \
         'its own with `relaunch: automatic`'
     RESTART_AGREES = 'restart of the bridge, its file agrees (during a replacement: < 60 s, ' \
-        'at rest)'
+        'at rest; after our take-off, PX4: in Hold at its height over home)'
     RESTART_DIFFERS = 'restart of the bridge, its file does not agree'
     RESTART_OURS = 'restart, airborne with our mission: in MISSION without a file, or in RETURN ' \
         '(PX4) at the end of the mission in its file'

@@ -2,6 +2,7 @@
 """Decides the authority over a vehicle after a start of the bridge, with or without a record."""
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityRecord, AuthorityState
@@ -13,6 +14,8 @@ from uav_task_alloc.mavlink.gcs.policy import Policy
 
 _REPLACEMENT_KEPT = 60.0  # [s] after which a replacement of the previous run is not continued
 _BRAKING_TIME = 10.0  # [s] from the HOLD command until the vehicle is at rest
+_CLIMB_ERROR = 0.1  # of the height of a take-off, by which its end differs at most
+_DRIFT = 5.0  # [m] from home at most where a take-off ends
 
 
 class BridgeRestart:
@@ -29,6 +32,7 @@ class BridgeRestart:
                  policy: Callable[[], Policy], record: AuthorityRecord | None) -> None:
         self._state, self._evidence, self._policy = state, evidence, policy
         self._record = record  # None once it is compared
+        self._first_at: float | None = None  # [s] the first heartbeat of this run
         self._armed_at_start = False  # it was armed before the bridge started
         self._mission: int | None = None  # checksum of one that may have ended while it was down
         self._landed_in: int | None = None  # custom_mode, of a landing of its own meanwhile
@@ -43,6 +47,7 @@ class BridgeRestart:
     def receive_heartbeat(self, now: float) -> None:
         """Compare the first heartbeat of this run with the record."""
         state, record = self._state, self._record
+        self._first_at = now if self._first_at is None else self._first_at
         if record is None:
             state.authority.undecided = self._armed_at_start = state.armed
             return
@@ -58,6 +63,12 @@ class BridgeRestart:
                 return  # decided at a later heartbeat
             agrees = at_rest
             state.replacing_since = record.replacing_since if agrees else None
+        if not agrees and self._may_have_climbed(record):
+            climbed = self._has_climbed(record.climb or 0.0)
+            if climbed is None and now - self._first_at < _BRAKING_TIME:
+                return
+            agrees = bool(climbed)
+            state.sent.climb = None
         self._record = None
         self._apply_result(record, agrees, now)
         self._await_battery_change(record)
@@ -90,6 +101,22 @@ class BridgeRestart:
         same = state.class_of(state.mode) is None or (
             state.mode in (record.mode, *record.commanded))
         return same and (state.armed == record.armed or (state.armed and record.arming))
+
+    def _may_have_climbed(self, record: AuthorityRecord) -> bool:
+        """Whether our take-off may have ended in HOLD while no bridge ran (PX4)."""
+        state = self._state
+        return (record.climb is not None and state.armed and (record.armed or record.arming)
+                and state.profile.takeoff_mode in (record.mode, *record.commanded)
+                and state.class_of(state.mode) is ModeClass.HOLD)
+
+    def _has_climbed(self, climb: float) -> bool | None:
+        """Whether it is at rest above its home, `climb` [m] high; None: not known, or not yet."""
+        telemetry = self._state.telemetry
+        home, known = telemetry.home, telemetry.has_position and telemetry.has_velocity
+        if home is None or not known or not telemetry.speed < REST_SPEED:
+            return None
+        return (abs(telemetry.height - climb) <= _CLIMB_ERROR * climb
+                and math.dist(telemetry.position[:2], home[:2]) <= _DRIFT)
 
     def _at_rest(self, replacing_since: float, now: float) -> bool | None:
         """Whether it is at rest for a replacement; None: not known, or it may still be braking."""
