@@ -63,9 +63,9 @@ class Craft:
         mode = ('STANDBY' if self.landed else 'TAKEOFF' if self.climbing else 'HOLD' if self.held
                 else 'LANDING' if self.descends else 'RETURNING' if self.returns else
                 'ON_MISSION' if self.legs or self.serving else 'HOLD')
-        task = self.serving or (self.legs[0].task if self.legs and not self.landed else '')
+        task = '' if self.landed else self.serving or self._next_task
         return UavReport(self.name, self.place, self.home, cruise_speed=SPEED,
-                         active_task=task if mode in ('ON_MISSION', 'HOLD') else '',
+                         active_task=task if mode in ('TAKEOFF', 'ON_MISSION', 'HOLD') else '',
                          list_revision=self.revision, standby=self.landed,
                          velocity=self.velocity, climb_speed=CLIMB, descent_speed=DESCENT,
                          mode=mode, authority='HELD', takeoff_height=CRUISE)
@@ -93,10 +93,10 @@ class Craft:
         if self.landed:
             self._take_off(now)
         elif not self.serving:
-            if self.legs and self.legs[0].task and self.legs[0].task not in self.started and (
-                    not self.climbing):
-                self.started.add(self.legs[0].task)
-                yield TaskEventKind.STARTED, self.legs[0].task
+            task = self._next_task  # from the first detour point on, as of its mission items
+            if task and task not in self.started and not self.climbing:
+                self.started.add(task)
+                yield TaskEventKind.STARTED, task
             self._move(now, dt)
         self.airborne_for += 0.0 if self.landed else dt
         self.velocity = tuple((q - p) / dt for p, q in zip(before, self.place, strict=True))
