@@ -244,3 +244,19 @@ def test_a_wait_of_the_plan_in_the_air_is_spent_at_the_stop_before():
     sky.world.params = AllocatorParams(background_budget=0.0, route_end='hold', **RULE)
     sky.report((-100.0, 0.0, 50.0), (0.0, -102.0, 50.0))  # it would meet u1 if that set out now
     assert sky.step() == []
+
+
+def test_one_on_its_way_home_from_rest_arrives_when_it_has_sped_up_and_braked():
+    # 55 m and 15 m/s: at home after 9 s, not 4 s, where u1 has come down to its height
+    sky = Sky({'mode': 'LANDING', 'velocity': (0.0, 0.0, -1.5), 'home': (0.0, 0.0, 0.0)},
+              {'mode': 'RETURNING', 'velocity': (0.0, 0.0, 0.0), 'home': (18.0, 0.0, 0.0)},
+              separation__horizontal=30.0, separation__vertical=10.0)
+    sky.world.lists.lists['u2'] = replace(sky.world.list_of('u2'), stops=(), returns=True,
+                                          end_via=((18.0, 0.0, 34.0),))
+    sky.report((0.0, 0.0, 54.0), (73.0, 0.0, 34.0))
+    assert sky.step() == [('u2', True)]
+
+
+def test_one_on_its_way_home_that_got_a_task_is_predicted_on_its_way_there():
+    sky = Sky({}, {'mode': 'RETURNING', 'home': (0.0, -200.0, 0.0)})
+    assert sky.step() == [('u1', True)]

@@ -144,6 +144,19 @@ def test_head_on_both_stop_before_they_collide_which_is_said_as_unresolved():
     assert any(alert.action is AlertAction.UNRESOLVED for alert in alerts)
 
 
+def test_one_that_would_stop_beside_one_that_comes_down_goes_on():
+    rule = Separation(30.0, 10.0, 2.0)
+    down = Way(((0.0, (0, 0, 46.9)), (31.3, (0, 0, 0))), pad=(0, 0, 0))
+    home = Way(((0.0, (20, 4, 34.0)), (1.0, (18, 0, 34.0)), (23.7, (18, 0, 0))), 4.0,
+               pad=(18, 0, 0))
+    uavs = {'down': MonitoredUav(down, (5.0,), False, 'down lands'),
+            'home': MonitoredUav(home, (3.0,), early=True)}
+    step = SeparationMonitor().step(0.0, uavs, rule)
+    assert [alert.action for alert in step.alerts] == [AlertAction.UNRESOLVED]
+    assert 'to stop makes it no better' in step.alerts[0].reason
+    assert not step.holds
+
+
 def test_head_on_the_first_whose_way_a_new_plan_frees_goes_on_and_then_the_other():
     crafts = head_on()
 

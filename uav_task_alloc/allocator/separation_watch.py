@@ -8,13 +8,13 @@ returns; then the one that is earlier at its next stop; last, those on the groun
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 
 from uav_task_alloc.allocator.records import ListStop
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.way_times import timed_points
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Point
@@ -31,7 +31,6 @@ from uav_task_alloc.separation.rule import FORGOTTEN
 _PERIOD = 0.5  # [s] of the published clock between two steps
 _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
-_ACCELERATION = 2.5  # [m/s2]
 _MOVES, _CLIMBS = 2.0, 0.5  # [m/s] more than that: it does not hover; it does not fly level
 _TOWARDS = math.cos(math.radians(15.0))  # of the course and the direction of home
 _CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
@@ -131,7 +130,8 @@ class SeparationWatch:
             down = [(0.0, place), (flight.pace.seconds((place, end)), end)]
             return MonitoredUav(self._way(record, down), (_URGENT,), False, f'{uav_id} lands')
         stops = self._stops(uav_id, stamp, flight)
-        returns = mode == 'RETURNING' or (not stops and self._world.list_of(uav_id).returns)
+        # one on its way home that got a task turns round within seconds
+        returns = not stops and (mode == 'RETURNING' or self._world.list_of(uav_id).returns)
         if mode == 'TAKEOFF':  # whatever follows; for how long is not known
             top = _climbed(record, stops[0].entry[2] if stops else place[2])
             points = [(0.0, place), (flight.pace.seconds((place, top)), top)]
@@ -140,14 +140,13 @@ class SeparationWatch:
             return MonitoredUav(self._way(record, points), (_URGENT,), False,
                                 f'{uav_id} takes off')
         if record.low or returns:
-            way = self._way(record, self._way_home(uav_id, record, flight.pace))
+            way = self._way(record, self._way_home(uav_id, record, flight))
             return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
                                 f'{uav_id} is low on battery' if record.low else '', early=True)
         points = self._list_points(uav_id, stops, flight)
         to_place = () if stops else self._way_to_place(uav_id, place)
         if to_place:
-            lag = _lag(record, flight.pace)
-            points = [(0.0, place), *_along(place, to_place, lag, flight.pace)]
+            points = _along([(0.0, place)], to_place, flight.pace, flight.share(to_place[0]))
         elif not stops:
             waits = mode == 'HOLD' or self._world.list_of(uav_id).waiting_place is not None
             points = [(0.0, place)] if waits else _drift(record)
@@ -162,12 +161,14 @@ class SeparationWatch:
             return ()
         return each.end_via[points_passed(place, each.end_via):]
 
-    def _way_home(self, uav_id: str, record: UavRecord, pace: FlightPace) -> _TimedPoints:
+    def _way_home(self, uav_id: str, record: UavRecord, flight: UavFlight) -> _TimedPoints:
         """The points of its list on the way home that are ahead, else its own return."""
-        via, place = self._world.list_of(uav_id).end_via, record.report.position
+        via, place = self._world.list_of(uav_id).end_via, flight.position
         if not via:
-            return _own_return(record, pace)
-        return _home([(0.0, place)], record, pace, via[points_passed(place, via):])
+            return _own_return(record, flight.pace)
+        ahead = via[points_passed(place, via):]
+        share = flight.share(ahead[0] if ahead else (*record.home[:2], place[2]))
+        return _home([(0.0, place)], record, flight.pace, ahead, share)
 
     def _way(self, record: UavRecord, points: _TimedPoints) -> Way:
         report = record.report
@@ -184,10 +185,10 @@ class SeparationWatch:
         """Where a UAV is and when [s from now], along the stops of the next 30 s."""
         record = self._world.uav_records()[uav_id]
         place = flight.position
-        clock = _ARMING if flight.on_ground else 0.0 if climbs else _lag(record, flight.pace)
+        clock = _ARMING if flight.on_ground else 0.0
         points = [(0.0, place), (clock, place)]
         for k, stop in enumerate(stops):
-            leg = stop.line
+            leg, share = stop.line, 0.0
             # as the bridge does, not at the task
             waits_before = k > 0 or flight.on_ground or flight.waiting == stop.task.id
             if waits_before and stop.wait > 0.0:
@@ -195,13 +196,13 @@ class SeparationWatch:
                 points.append((clock, place))
             if k == 0:
                 leg = leg[points_passed(place, leg):]
+                share = 0.0 if climbs or clock > 0.0 else flight.share(leg[0])
                 if climbs:
                     top = _climbed(record, leg[0][2])
                     clock += flight.pace.seconds((place, top))
                     points += [(clock, top), (clock + _SETS_OUT, top)]
                     place, clock = top, clock + _SETS_OUT
-            for timed in _along(place, leg, clock, flight.pace):
-                points.append(timed)
+            points = _along([*points, (clock, place)], leg, flight.pace, share)
             place = stop.exit
             clock = points[-1][0] + max(0.0, stop.task.stay - stop.served)
             clock += 0.0 if waits_before else stop.wait
@@ -220,27 +221,21 @@ def _climbed(record: UavRecord, height: float) -> Point:
     return x, y, max(z + _CLIMBS_ON * rise, height, record.home[2] + top)
 
 
-def _lag(record: UavRecord, pace: FlightPace) -> float:
-    """The time [s] that a UAV loses by speeding up first."""
-    speed = math.hypot(*(record.report.velocity or (0.0,)))
-    return max(0.0, pace.speed - speed) / (2.0 * _ACCELERATION)
-
-
-def _along(start: Point, points: Sequence[Point], clock: float, pace: FlightPace
-           ) -> Iterator[tuple[float, Point]]:
-    """Points of a leg with the times [s] at which they are reached."""
-    for one, other in pairwise((start, *points)):
-        clock += pace.seconds((one, other))
-        yield clock, other
+def _along(points: _TimedPoints, line: Sequence[Point], pace: FlightPace,
+           share: float = 0.0) -> _TimedPoints:
+    """The points, and then those of a leg, from a share of its speed to a stop."""
+    clock, place = points[-1]
+    return [*points, *((clock + t, point)
+                       for t, point in timed_points((place, *line), pace, share))]
 
 
 def _home(points: _TimedPoints, record: UavRecord, pace: FlightPace,
-          via: Sequence[Point] = ()) -> _TimedPoints:
+          via: Sequence[Point] = (), share: float = 0.0) -> _TimedPoints:
     """The points, and then the way home at the height of the last one, and down."""
-    clock, place = points[-1]
-    home = record.home
+    place, home = points[-1][1], record.home
     above = (home[0], home[1], max(home[2], (via[-1] if via else place)[2]))
-    return [*points, *_along(place, (*via, above, home), clock, pace)]
+    clock, place = (points := _along(points, (*via, above), pace, share))[-1]
+    return [*points, (clock + pace.seconds((place, home)), home)]
 
 
 def _seems_to_return(record: UavRecord) -> bool:
@@ -264,7 +259,9 @@ def _own_return(record: UavRecord, pace: FlightPace) -> _TimedPoints:
     if math.hypot(vx, vy) > _MOVES and vz < _CLIMBS:  # it has climbed
         top = z
     up = (x, y, top)
-    return _home([(0.0, report.position), (pace.seconds((report.position, up)), up)], record, pace)
+    share = min(1.0, math.hypot(vx, vy) / pace.speed) if top == z else 0.0
+    return _home([(0.0, report.position), (pace.seconds((report.position, up)), up)], record,
+                 pace, share=share)
 
 
 def _drift(record: UavRecord, age: float = 0.0) -> _TimedPoints:

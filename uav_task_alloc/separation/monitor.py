@@ -248,8 +248,10 @@ class SeparationMonitor:
             self._begin(name, other, f'{name} stops: no way past {other} is free')
             predicted.set_holding(name, True)
         why = ', '.join(uavs[name].why_not for name in pair if uavs[name].why_not)
-        text = f'{" and ".join(stops)} stop' if len(stops) == 2 else (
-            f'{stops[0]} stops' if stops else 'nobody can be stopped')
+        stopped = [name for name in stops if name in self._holds]
+        text = f'{" and ".join(stopped)} stop' if len(stopped) == 2 else (
+            f'{stopped[0]} stops' if stopped else 'nobody can be stopped' if not stops else
+            'and to stop makes it no better')
         holder = lesser if lesser in self._holds else next(
             (name for name in pair if name in self._holds), '')
         self._publish(pair, loss, AlertAction.UNRESOLVED, holder,

@@ -22,6 +22,7 @@ _MARGIN = 1.0  # [m] horizontally, for positions between the points and errors o
 _SLACK = 0.3  # [m] vertically: plans keep the vertical distance exactly, autopilots nearly
 _NEARER = 1.0  # [m] by which two that are too near already come nearer
 _SOONER = 0.5  # [s] by which a loss begins earlier
+_CLOSER = 0.1  # share of the distances by which a loss is worse
 # times the horizontal distance, and [s] more of time, that a UAV needs to go on
 _CAUTION, _PATIENCE = 1.15, 2.0
 _Floats = NDArray[np.float64]
@@ -46,6 +47,7 @@ class PredictedLoss:
     begins: float  # [s] from now; 0: it is lost
     horizontal: float  # [m] when they are nearest
     vertical: float  # [m] then
+    share: float = 0.0  # of the distances that is kept: the greater of both shares, at the least
 
 
 class FlightPredictions:
@@ -140,7 +142,8 @@ class FlightPredictions:
         current = self.loss(a, b)
         return stopped is None or (current is not None
                                    and stopped.horizontal > current.horizontal - _NEARER
-                                   and stopped.begins > current.begins - _SOONER)
+                                   and stopped.begins > current.begins - _SOONER
+                                   and stopped.share > current.share - _CLOSER)
 
     def _path(self, uav_id: str, holds: bool) -> _Floats:
         return (self._stay if holds else self._go)[uav_id]
@@ -217,7 +220,7 @@ def _first_loss(a: _Floats, b: _Floats, horizontal: float, vertical: float, shif
 
     Where it is lost already, it counts only if they come nearer: both may fly apart.
     """
-    first, nearest, best = math.inf, (0.0, 0.0), math.inf
+    first, nearest, best, share = math.inf, (0.0, 0.0), math.inf, math.inf
     now = math.hypot(a[0, 0] - b[0, 0], a[0, 1] - b[0, 1])
     if now < horizontal and abs(a[0, 2] - b[0, 2]) < vertical and not (
             a_on_pad[0] and b_on_pad[0]):
@@ -233,10 +236,12 @@ def _first_loss(a: _Floats, b: _Floats, horizontal: float, vertical: float, shif
                 continue
             at = np.flatnonzero(lost)
             first = min(first, float(at[0]) * _DT)
+            share = min(share, float(np.maximum(apart[at] / horizontal,
+                                                above[at] / vertical).min()))
             k = at[np.argmin(apart[at])]
             if apart[k] < best:
                 best, nearest = float(apart[k]), (float(apart[k]), float(above[k]))
-    return PredictedLoss(first, *nearest) if first < math.inf else None
+    return PredictedLoss(first, *nearest, share) if first < math.inf else None
 
 
 def _ranges(shift: int) -> Sequence[tuple[slice, slice]]:
