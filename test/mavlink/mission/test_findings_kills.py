@@ -205,7 +205,7 @@ def test_a_reached_received_while_the_mission_was_read_again_is_no_evidence_afte
     bench = flying(kind, 'AB')
     assert bench.run(lambda: distance(bench, AT_A) < 10.0)
     drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: True)
-    bench.onboard()._mission.reset()
+    bench.onboard().mission.reset()
     assert bench.run(lambda: bench.completed() == ['A'], 10.0)
     bench.run(limit=1.0)
     bench.line.tampers.clear()

@@ -246,9 +246,10 @@ def upload_during(flight, **places):
 
 def confirm(flight, reports, new, begin, plan=0):
     """The upload is confirmed: the vehicle may fly the new mission since `begin` [s]."""
+    reports.sent_since = begin
     of_new = reports.begin_new(new)
     flight.table.begin(new.items, 0, flight.now, since=begin)
-    reports.replay(of_new, plan, None)
+    reports.replay(of_new, plan)
 
 
 def test_a_kept_reached_counts_however_far_the_vehicle_has_flown_since():

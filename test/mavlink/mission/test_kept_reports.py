@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reports that are kept during a long upload are judged once each."""
+"""Reports that are kept during an upload are judged once each, by the items that were on board."""
+import pytest
+from authority_bench import MODES, PX4, flying
 from evidence_bench import Flight
-from test_findings_uploads import confirm, upload_during
+from findings_bench import distance, drop_messages, flown_once_each
+from flight_bench import places
+from mission_bench import task_list
+from test_findings_uploads import AT_A, confirm, upload_during
 
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 from uav_task_alloc.mavlink.mission.reports_during_upload import ReportsDuringUpload
 
 
@@ -42,3 +48,61 @@ def test_a_repetition_that_began_before_an_upload_is_not_of_its_mission():
     confirm(flight, reports, new, begin)
     flight.stay(10.0)
     assert list(flight.table.completed) == ['A', 'C']
+
+
+@pytest.mark.parametrize('early', [True, False])
+def test_a_place_passed_before_a_mission_was_sent_is_not_flown_by_a_repetition(early):
+    flight = Flight()
+    flight.begin(A=50.0, X=900.0)
+    flight.fly_to(50.0)
+    flight.reached(0)
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    for _ in range(9):
+        flight.stay(1.0, 10.0)
+        flight.reached(0)
+    reports, new = upload_during(flight, C=100.0, D=-900.0)
+    reports.note_sent(flight.frame())
+    flight.stay(1.0, 10.0)
+    reports.add_reached(0, flight.now, flight.frame())
+    if early:
+        reports.step(new, flight.now)
+    confirm(flight, reports, new, reports.sent_since)
+    flight.stay(10.0)
+    assert list(flight.table.completed) == ['A']
+
+
+@PX4
+@pytest.mark.parametrize('lost', [(), ('MISSION_ITEM_REACHED',)])
+@pytest.mark.parametrize('then', ['', 'newer list', 'pilot'])
+def test_a_task_whose_item_of_an_earlier_upload_came_late_and_was_stored_is_flown_once(
+        kind, lost, then):
+    bench, reread = flying(kind, 'AB'), []
+    late = next(m for m in bench.line.sent('MISSION_ITEM_INT') if m.seq == 0)  # of A
+
+    def tamper(direction, m, now):
+        if m.get_type() != 'MISSION_ITEM_INT':
+            return None
+        if direction == 'up' and m.seq == 0 and not reread:
+            return [(0.0, late)]
+        if direction == 'down' and m.seq == 1:
+            reread.append(now)
+            return None if places(bench) else []
+        return None
+    bench.line.tampers.append(tamper)
+    for kind_lost in lost:
+        drop_messages(bench, 'down', kind_lost, lambda m: len(places(bench)) == 1)
+    bench.run(lambda: distance(bench, AT_A) < 25.0)
+    bench.assign(task_list('CBA', 2))
+    assert bench.run(lambda: reread, 10.0)
+    if then == 'newer list':
+        bench.assign(task_list('CDBA', 3))
+    elif then == 'pilot':
+        drop_messages(bench, 'down', 'MISSION_ITEM_INT',
+                      lambda m: m.seq == 2 and bench.authority() is AuthorityState.HELD)
+        assert bench.run(lambda: places(bench) == ['A'], 10.0)
+        bench.run(limit=0.6)
+        bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.run(lambda: bench.completed() == ['A'], 20.0)
+    if then == 'pilot':
+        assert bench.hand_over() == ''
+    flown_once_each(bench, 'ABCD' if then == 'newer list' else 'ABC')

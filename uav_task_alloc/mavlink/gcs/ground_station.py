@@ -239,7 +239,7 @@ class GroundStation:
         for (_, assigned), (other, executor) in permutations(executors, 2):
             if assigned.onboard.tasks is not None:
                 assigned.drop_flown(executor.onboard.resume.flown_tasks(
-                    assigned.onboard.open_tasks(), now), other)
+                    assigned.onboard.list.open_tasks(), now), other)
 
     def _discover(self, address: RemoteKey, message: Message, now: float) -> VehicleSession | None:
         config, system = self._config, message.get_srcSystem()

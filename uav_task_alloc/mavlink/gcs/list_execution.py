@@ -135,9 +135,9 @@ class ListExecution:
 
         It does not either where the current item was set after the end.
         """
-        telemetry, progress = self._telemetry, self._onboard.progress
+        telemetry, onboard, progress = self._telemetry, self._onboard, self._onboard.progress
         if self._profile.atomic or telemetry.current is None or progress.finished or (
-                progress.active is None or telemetry.current_at <= self._onboard.verified_at):
+                progress.active is None or telemetry.current_at <= onboard.mission.verified_at):
             return False
         return (telemetry.mission_stopped and telemetry.airborne) or (
             telemetry.mission_state == d.MISSION_STATE_COMPLETE

@@ -38,7 +38,7 @@ class MissionEvidence:
         telemetry, onboard = self._telemetry, self._onboard
         return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
                 and now - telemetry.current_at < LATE_REACHED
-                and (onboard.taken or now - onboard.verified_at < LATE_REACHED))
+                and (onboard.taken or now - onboard.mission.verified_at < LATE_REACHED))
 
     def returning(self) -> bool:
         """Whether the item that returns or lands is next, is being flown, or is flown."""
@@ -68,7 +68,7 @@ class MissionEvidence:
 
     def foreign(self) -> bool:
         """Whether another station has changed the verified mission."""
-        return self._onboard.is_foreign
+        return self._onboard.mission.is_foreign
 
     def position_time(self) -> float:
         """Vehicle time [s] of the newest position."""

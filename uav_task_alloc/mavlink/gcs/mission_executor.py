@@ -366,7 +366,7 @@ class MissionExecutor:
         """After a restart of the bridge, complete the tasks flown in the meantime."""
         onboard = self.onboard
         assert onboard.tasks is not None
-        if onboard.resume.awaits_position(onboard.held or (), onboard.verified_at, now):
+        if onboard.resume.awaits_position(onboard.held or (), onboard.mission.verified_at, now):
             return []  # its current item is not known yet
         onboard.resume.locate(onboard.held or (), onboard.tasks, now)
         onboard.complete_flown(now)

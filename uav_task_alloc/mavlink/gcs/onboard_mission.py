@@ -11,7 +11,12 @@ from uav_task_alloc.mavlink.gcs.resume import Resume
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_failures import UploadFailures
 from uav_task_alloc.mavlink.mission.diff import DiffKind, LatestDiff, MissionDiff, diff_missions
-from uav_task_alloc.mavlink.mission.flown_meanwhile import first_task, next_unflown, resumed_at
+from uav_task_alloc.mavlink.mission.flown_meanwhile import (
+    first_task,
+    next_after_unset,
+    next_unflown,
+    resumed_at,
+)
 from uav_task_alloc.mavlink.mission.items import Item, TaskList, all_alike, home_item
 from uav_task_alloc.mavlink.mission.outcomes import Accepted, Downloaded, Failed, Mission, Verified
 from uav_task_alloc.mavlink.mission.peer import Peer
@@ -19,10 +24,9 @@ from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.reports_during_upload import ReportsDuringUpload
 from uav_task_alloc.mavlink.mission.upload import SUPERSEDED, Upload
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState, VerifiedMission
-from uav_task_alloc.mavlink.mission.wanted_mission import TaskFailed, WantedMission
+from uav_task_alloc.mavlink.mission.wanted_mission import WantedMission
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
-from uav_task_alloc.model import Task
 
 LATE_REACHED = 6.0  # [s] around the end of a mission in which its last REACHED comes
 
@@ -42,12 +46,13 @@ class OnboardMission:
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
         self.upload.is_superseded = self._overtaken
+        self.upload.on_difference = self._correct
         self.upload.may_end = lambda: not (profile.atomic and self.list.leave_out_detours())
         self.progress = ProgressTable(telemetry.frames, profile.atomic, profile.rules.loiters)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
         self.list = WantedMission(profile, origin, self.progress, lambda: telemetry.airborne,
-                                  lambda: telemetry.home or self._mission.landing_place(origin))
+                                  lambda: telemetry.home or self.mission.landing_place(origin))
         self.resume.cruise = lambda: self.list.cruise()
         self.revision = 0  # of the last list verified on board
         self.notes: deque[OperatorNote] = deque()
@@ -56,13 +61,11 @@ class OnboardMission:
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._at_start: object = None  # of the upload: tasks done, detour points left out
         self._reports = ReportsDuringUpload(self.progress, origin)
-        self._mission, self._latest_diff = VerifiedMission(self.own, profile.atomic), LatestDiff()
+        self.mission, self._latest_diff = VerifiedMission(self.own, profile.atomic), LatestDiff()
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
         self._taken = False  # the vehicle has taken all items of this upload
         self._unconfirmed: tuple[MissionDiff, TaskList] | None = None  # sent; perhaps on board
-        self._sent_since: float | None = None  # vehicle time [s]: it may fly all items since then
-        self._sent_frame: int | None = None  # number of the frame received last at that time
         self.item_time = self.upload_started_at = 0.0  # [s] per item, smoothed; of the latest
         self._completed_for: tuple[TaskList, int] | None = None
         self._flown_unset: int | None = None  # flown though `set_current_to` is not set yet
@@ -70,27 +73,17 @@ class OnboardMission:
     @property
     def held(self) -> tuple[Item, ...] | None:
         """The items on board, without home; None: unknown, to be read."""
-        return self._mission.items
-
-    @property
-    def verified_at(self) -> float:
-        """Steady time [s] at which they were read last."""
-        return self._mission.verified_at
-
-    @property
-    def is_foreign(self) -> bool:
-        """Whether another party has changed the verified mission."""
-        return self._mission.is_foreign
+        return self.mission.items
 
     @property
     def state(self) -> MissionState:
         """UPLOADING during a transfer, else `stored`."""
-        return MissionState.UPLOADING if self._uploading is not None else self._mission.state
+        return MissionState.UPLOADING if self._uploading is not None else self.mission.state
 
     @property
     def stored(self) -> MissionState:
         """State of the stored mission, independent of a running transfer."""
-        return self._mission.state
+        return self.mission.state
 
     @property
     def open(self) -> bool:
@@ -119,11 +112,6 @@ class OnboardMission:
         """The latest list."""
         return self.list.tasks
 
-    @property
-    def failed(self) -> deque[TaskFailed]:
-        """Tasks that the vehicle refuses, to be reported."""
-        return self.list.failed
-
     def remaining(self) -> TaskList:
         """The list without flown and refused tasks, up to the horizon."""
         return self.list.remaining()
@@ -131,10 +119,6 @@ class OnboardMission:
     def wanted(self) -> tuple[Item, ...]:
         """The mission items still to be flown."""
         return self.list.items()
-
-    def open_tasks(self) -> tuple[Task, ...]:
-        """Tasks of the list that are not flown and not refused."""
-        return self.list.open_tasks()
 
     def diff(self) -> MissionDiff:
         """What to change on board so that the list is flown; requires a known mission."""
@@ -170,7 +154,7 @@ class OnboardMission:
         """Start the upload of `diff` for the present list."""
         assert self.tasks is not None
         self._uploading, self._taken, self.transfer_failed = (diff, self.tasks), False, False
-        self.upload_started_at, self._sent_since, self._sent_frame = now, None, None
+        self.upload_started_at, self._reports.sent_since = now, None
         self.list.horizon.begin()
         self._at_start = self._done(), self.list.left_out
         home = (home_item(self._telemetry.home, self._origin, self._profile.rules),) * self.own
@@ -200,15 +184,15 @@ class OnboardMission:
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of the mission protocol; returns the messages to send."""
         if (kind := message.get_type()) in ('MISSION_ACK', 'MISSION_COUNT'):
-            self._mission.note_mission_id(message)
+            self.mission.note_mission_id(message)
         elif kind == 'MISSION_CURRENT' and self._profile.atomic:
             self.progress.end_before_restart.note_current(message, now)
         out = self.upload.receive(message, now)
         if not self.upload.may_be_stored:
             if self.upload.busy and self._unconfirmed is None:
-                self._sent_since = None
-        elif self._sent_since is None:
-            self._sent_since, self._sent_frame = self.progress.path.newest, self._telemetry.frame
+                self._reports.sent_since = None
+        elif self._reports.sent_since is None:
+            self._reports.note_sent(self._telemetry.frame)
         self._settle(now)
         return out
 
@@ -230,6 +214,7 @@ class OnboardMission:
         if self._may_be_of_new and not (self._appends and seq < len(self.progress.items)):
             self._reports.add_reached(seq, now, self._telemetry.frame)
         else:
+            self._reports.note_passed(seq, now, self._telemetry.frame, is_current=False)
             self.progress.note_reached(seq, now, frame=frame)
 
     @property
@@ -251,14 +236,15 @@ class OnboardMission:
             now: steady time [s].
             flying: whether the vehicle is in mission mode.
         """
+        seq, frame = max(0, message.seq - self.own), self._telemetry.frame
         if not self.open or self._appends or not (flying or self._profile.atomic):
+            self._reports.note_passed(seq, now, frame, is_current=True, flying=flying)
             return True  # ArduPilot's current item stays that of the old mission until it flies
-        if self._mission.has_mission_id(message):
+        if self.mission.has_mission_id(message):
             self._reports.release(self._telemetry.frame)
             return True
         if not self._may_be_of_new:
             return self._profile.atomic  # PX4 flies the old mission until it has all items
-        seq, frame = max(0, message.seq - self.own), self._telemetry.frame
         self._reports.add_current(seq, now, frame, flying, plan_id(message))
         return False
 
@@ -269,25 +255,22 @@ class OnboardMission:
             seq: index without home.
             now: steady time [s].
         """
-        before, self._flown_unset, items = self._flown_unset, seq, self.progress.items
-        if before is None or self._profile.atomic or not before < seq <= len(items):
-            return
-        if self.progress.was_at_by(items[before], now):
-            self.progress.credit(items[before])
-        self.set_current_to = next((n for n, item in enumerate(items) if item.task and (
-            item.task not in self.progress.completed)), self.set_current_to)
+        before, self._flown_unset = self._flown_unset, seq
+        if before is not None and not self._profile.atomic:
+            self.set_current_to = next_after_unset(
+                self.progress, before, seq, now, self.set_current_to)
 
     def abort(self) -> list[Message]:
         """Abort the transfer: another party controls the vehicle."""
         if self.upload.busy:
             self.upload.reset()
         if self._uploading is not None:
-            if self._sent_since is not None and not self._taken:
+            if self._reports.sent_since is not None and not self._taken:
                 self._unconfirmed = self._uploading
             else:
                 self._reports.credit(self._uploading[0])
             self._uploading = None
-            self._mission.interrupt()
+            self.mission.interrupt()
         return []
 
     def verified(self) -> bool:
@@ -302,20 +285,21 @@ class OnboardMission:
         self.upload.reset()
         self._failures.clear()
         self.progress.invalidate()
-        self._mission.reset()
+        self.mission.reset()
         self._uploading = self._unconfirmed = None
         self.resume.reset()
 
     def watch(self, message: Message, now: float) -> None:
         """Check a MISSION_CURRENT for changes by another party; a doubt leads to a readback."""
-        self._mission.check_current(message, now)
+        self.mission.check_current(message, now)
 
     def complete_flown(self, now: float) -> None:
         """Complete the tasks that the vehicle has flown while the bridge was down."""
         flown = len(self.resume.flown_items(now))
         if flown and self.tasks and (self.tasks, flown) != self._completed_for:
             self._completed_for = self.tasks, flown
-            self.progress.complete_offline(self.resume.flown_tasks(self.open_tasks(), now))
+            self.progress.complete_offline(self.resume.flown_tasks(
+                self.list.open_tasks(), now))
 
     def _settle(self, now: float) -> None:
         self._failures.step(now)
@@ -347,8 +331,8 @@ class OnboardMission:
         if diff.kind is DiffKind.APPEND:
             self.progress.extend(diff.items)
         else:
-            self.progress.begin(diff.items, diff.start, now, since=self._sent_since)
-        self._reports.replay(of_new, self._mission.reported_id, self._sent_frame)
+            self.progress.begin(diff.items, diff.start, now, since=self._reports.sent_since)
+        self._reports.replay(of_new, self.mission.reported_id)
         current = self.progress.current
         if diff.kind is not DiffKind.APPEND and not self._profile.atomic:
             self.set_current_to = current if current is not None and (
@@ -357,8 +341,17 @@ class OnboardMission:
             self.progress.note_set_current(later, now)
             self.set_current_to = later
 
+    def _correct(self, held: tuple[Item, ...], now: float) -> bool:
+        """Count reports for the items that PX4 has taken, where they are others than were sent."""
+        if not self._profile.atomic or not self.resume.located or not self._reports.correct(
+                self.resume.read_again(held, self.tasks)[0], now):
+            return False
+        self._taken, self.set_current_to, self.mission.altered = False, None, True
+        return True
+
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
-        self._mission.verify(items, now)
+        self.mission.verify(items, now)
+        self._reports.confirm()
         self.revision = revision
         self.list.horizon.verified()
 
@@ -375,10 +368,13 @@ class OnboardMission:
                 self._verify(diff.items, tasks.revision, now)
                 return
             self._reports.credit(diff)
-        if not self._mission.note_readback(
+        if not self.mission.note_readback(
                 held, known, self.tasks is not None, lambda: self._can_continue(held), now):
+            self._reports.confirm()
             return
         self.resume.keep_flown()
+        if self._correct(held, now):
+            return
         (items, since), seq = self.resume.read_again(held, self.tasks), self._telemetry.current
         self.progress.begin(items, None if seq is None or not held else max(0, seq - self.own),
                             now, read=True, since=since)
@@ -390,9 +386,9 @@ class OnboardMission:
             held, None, wanted, done=self.progress.completed).kind is not DiffKind.REPLACE
 
     def _on_failure(self, event: Failed, diff: MissionDiff, tasks: TaskList, now: float) -> None:
-        self._mission.interrupt()
+        self.mission.interrupt()
         self.transfer_failed = event.reason != SUPERSEDED
-        if event.result is None and self._sent_since is not None and not self._taken:
+        if event.result is None and self._reports.sent_since is not None and not self._taken:
             self._unconfirmed = diff, tasks
         else:
             self._reports.credit(diff)

@@ -12,7 +12,7 @@ def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
     """Events of tasks since the last call; completed ones are marked in the authority record."""
     events: list[TaskProgress] = []
     progress, revision = onboard.progress, onboard.revision
-    if not progress.events and not onboard.failed:  # as at most calls
+    if not progress.events and not onboard.list.failed:  # as at most calls
         return events
     while progress.events:
         event = progress.events.popleft()
@@ -21,8 +21,8 @@ def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
         if event.completed:
             watch.mark_task(event.task, progress.completed.get(event.task), True, now)
         events.append(TaskProgress(event.task, kind, latest))
-    while onboard.failed:
-        failed = onboard.failed.popleft()
+    while onboard.list.failed:
+        failed = onboard.list.failed.popleft()
         events.append(TaskProgress(failed.task, 'FAILED', failed.revision, failed.reason))
     return events
 

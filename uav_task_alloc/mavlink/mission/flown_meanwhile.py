@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where PX4 goes on with a mission that it has taken: it flies the old one during the upload."""
+"""Where a vehicle goes on with a mission that it has taken, and has not flown from its start."""
 from __future__ import annotations
 
 from uav_task_alloc.mavlink.mission.diff import MissionDiff, point_at_or_before
@@ -51,6 +51,29 @@ def next_unflown(progress: ProgressTable) -> int | None:
         return None
     return next((n for n, other in enumerate(progress.items[:progress.last_flown + 1])
                  if n > (progress.current or 0) and other.task not in progress.completed), None)
+
+
+def next_after_unset(progress: ProgressTable, before: int, seq: int, now: float,
+                     otherwise: int | None) -> int | None:
+    """Return where an ArduPilot goes on that has flown before its current item was set.
+
+    Args:
+        progress: of the vehicle; what it has reached is credited.
+        before: index of the item that it flew until now.
+        seq: index of the item that it flies.
+        now: steady time [s] at which that was reported.
+        otherwise: returned where it has flown to no other item, or all tasks are completed.
+
+    Returns:
+        The index of the first item of a task that is not completed.
+    """
+    items = progress.items
+    if not before < seq <= len(items):
+        return otherwise
+    if progress.was_at_by(items[before], now):
+        progress.credit(items[before])
+    return next((n for n, item in enumerate(items)
+                 if item.task and item.task not in progress.completed), otherwise)
 
 
 def first_task(diff: MissionDiff) -> str | None:

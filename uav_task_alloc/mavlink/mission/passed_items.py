@@ -81,6 +81,10 @@ class PassedItems:
         return frozenset(item.task for claim in self.claims if not claim.skips
                          for item in claim.items) if self.claims else NO_TASKS
 
+    def drop_epoch(self, epoch: int) -> None:
+        """Drop the claims of an epoch, by its number: its items are other ones."""
+        self.claims = tuple(claim for claim in self.claims if claim.epoch != epoch)
+
     def clear(self) -> None:
         """Drop all claims: the mission on board is unknown."""
         self.claims = ()

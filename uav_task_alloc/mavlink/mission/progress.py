@@ -204,6 +204,15 @@ class ProgressTable:
         if read and since is None:  # along the way that a mission found on board is on
             self.coverage.continue_at(self.active, self.path.sample)
 
+    def correct(self, items: tuple[Item, ...], start: int, now: float) -> None:
+        """Replace the items of this epoch: the vehicle has taken other ones than were sent."""
+        epoch = self._epoch
+        self._moves.passed.drop_epoch(epoch.number)
+        epoch.number, epoch.items, epoch.current = epoch.number + 1, items, start
+        epoch.since = epoch.begin
+        self._reached.begin()
+        self._moves.begin(start, now)
+
     def extend(self, items: tuple[Item, ...]) -> None:
         """Begin a new epoch whose first items are those of the last one; the vehicle flies on."""
         self._epoch.number += 1
@@ -370,10 +379,10 @@ class ProgressTable:
         return self.positions.was_at(
             item, max(self._epoch.since, since), self.positions.vehicle_time(when))
 
-    def was_exactly_at(self, item: Item, when: float) -> bool:
-        """Whether it was within the radius of an item before a message at `when` [s]."""
+    def was_exactly_at(self, item: Item, when: float, since: float = -math.inf) -> bool:
+        """Whether it was within the radius of an item; see `was_at_by`."""
         return self.positions.was_at(
-            item, self._epoch.since, self.positions.vehicle_time(when), close=0.0)
+            item, max(self._epoch.since, since), self.positions.vehicle_time(when), close=0.0)
 
     def near_one(self, item: Item, other: Item | None, when: float) -> bool:
         """Whether it was near one item, but not another, before a message at `when` [s]."""

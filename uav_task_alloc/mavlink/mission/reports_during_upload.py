@@ -40,12 +40,27 @@ class _Current(NamedTuple):
     plan: int  # mission id (PX4); 0: none
 
 
+class _Passed(NamedTuple):
+    """A report that was passed on for a mission that is not read back yet."""
+
+    frame: int  # its number
+    is_current: bool  # MISSION_CURRENT, not MISSION_ITEM_REACHED
+    seq: int  # index without home
+    when: float  # [s] received
+    flying: bool  # in mission mode
+
+
 class ReportsDuringUpload:
     """Keeps reports until the upload is decided; then credits them to the old or new mission.
 
     Args:
         progress: where they are credited.
         origin: of the ENU frame of the mission items.
+
+    Attributes:
+        sent_since: vehicle time [s] before which the new mission was not on board; None: it is
+            not sent to its end.
+        sent_frame: number of the frame received last at that time.
 
     Arguments of methods:
         seq: number of the mission item.
@@ -61,11 +76,19 @@ class ReportsDuringUpload:
         self._reached: list[_Reached] = []
         self._currents: list[_Current] = []
         self._judged: set[tuple[int, int]] = set()  # first and last frame of series credited early
+        self.sent_since: float | None = None
+        self.sent_frame: int | None = None
+        self._start = 0  # index of the item at which the new mission begins
+        self._passed: list[_Passed] | None = None  # for the mission taken; None: it is read back
 
     @property
     def has_reached(self) -> bool:
         """Whether a REACHED was received that may be of either mission."""
         return bool(self._reached)
+
+    def note_sent(self, frame: int) -> None:
+        """Note that the new mission was sent to its end, and may be on board from now on."""
+        self.sent_since, self.sent_frame = self._progress.path.newest, frame
 
     def add_reached(self, seq: int, now: float, frame: int) -> None:
         """Keep a REACHED that may be of the old or of the new mission."""
@@ -82,6 +105,47 @@ class ReportsDuringUpload:
         if len(self._currents) < _MAX_CURRENT:
             self._currents.append(_Current(seq, now, frame, flying, plan))
 
+    def note_passed(self, seq: int, now: float, frame: int, is_current: bool,
+                    flying: bool = True) -> None:
+        """Keep a report that was passed on, until the mission taken is read back.
+
+        Args:
+            seq, now, frame, flying: see above.
+            is_current: a MISSION_CURRENT, not a MISSION_ITEM_REACHED.
+        """
+        if self._passed is not None and len(self._passed) < _MAX_CURRENT:
+            self._passed.append(_Passed(frame, is_current, seq, now, flying))
+
+    def confirm(self) -> None:
+        """Note that the mission taken was read back, and is the one sent."""
+        self._passed = None
+
+    def correct(self, items: tuple[Item, ...], now: float) -> bool:
+        """Pass on again, for the items read back, what was reported since a mission was taken.
+
+        Args:
+            items: on board, with their tasks: other ones than were sent.
+            now: see above.
+
+        Returns:
+            Whether the vehicle has taken a mission that was not read back until now.
+        """
+        passed, self._passed = self._passed, None
+        if passed is None:
+            return False
+        currents = [each.seq for each in passed if each.is_current]
+        self._progress.correct(items, currents[0] if currents else self._start, now)
+        for each in passed:
+            self._pass_on(each, proven=False)
+        return True
+
+    def _pass_on(self, report: _Passed, proven: bool) -> None:
+        frame, is_current, seq, when, flying = report
+        if is_current:
+            self._progress.note_current(seq, when, flying, frame)
+        else:
+            self._progress.note_reached(seq, when, proven=proven, frame=frame)
+
     def end(self, uploaded: MissionDiff | None) -> None:
         """Credit by the positions, and drop the rest: the vehicle was restarted."""
         if uploaded is not None:
@@ -89,6 +153,7 @@ class ReportsDuringUpload:
         self._reached.clear()
         self._currents.clear()
         self._judged.clear()
+        self._passed = None
 
     def release(self, frame: int) -> None:
         """Credit REACHED sent before a frame that shows the old mission on board."""
@@ -111,7 +176,7 @@ class ReportsDuringUpload:
         Returns:
             (seq, received at [s], frame) of those of the new mission.
         """
-        of_new, old = [], self._progress.items
+        of_new, old, self._start = [], self._progress.items, uploaded.start
         for reached in self._reached:
             seq = reached.seq
             before = with_position(old[seq], self._origin) if 0 <= seq < len(old) else None
@@ -134,11 +199,12 @@ class ReportsDuringUpload:
         progress, first = self._progress, self._first_at(reached)
         if first < kept_at or progress.may_repeat_earlier(seq, last, last_frame):
             return self._credit_repeated(reached, before, after, uploaded.start)
-        if before is not None and self._was_at(before, reached, len(progress.items)):
+        if before is not None and self._was_at(before, reached, len(progress.items), -math.inf):
             progress.note_reached(seq, first, proven=True, frame=frame)
         elif before is not None and after is not None and alike(before, after):
             progress.note_reached(seq, first, frame=frame)
-        elif after is not None and self._was_at(after, reached, len(uploaded.items)):
+        elif after is not None and self._was_at(
+                after, reached, len(uploaded.items), self._new_since):
             return first
         elif before is not None and progress.near_one(before, after, first):
             if before.task:
@@ -151,49 +217,54 @@ class ReportsDuringUpload:
             return self._credit_repeated(reached, before, after, uploaded.start)
         return None
 
-    def _was_at(self, item: Item, reached: _Reached, count: int) -> bool:
+    @property
+    def _new_since(self) -> float:
+        """Vehicle time [s] before which nothing of the new mission was flown."""
+        return -math.inf if self.sent_since is None else self.sent_since
+
+    def _was_at(self, item: Item, reached: _Reached, count: int, since: float) -> bool:
         """Whether it has reached an item of a mission of `count` items before a REACHED.
 
         Not as long as that item was still reported as current, before this REACHED; the last
         item stays current.
         """
         positions = self._progress.positions
-        since = -math.inf if reached.seq >= count - 1 else max((
+        reported = -math.inf if reached.seq >= count - 1 else max((
             positions.sent_between(each.frame)[0] for each in self._currents
             if each.flying and each.seq == reached.seq and each.frame < reached.frame),
             default=-math.inf)
-        return self._progress.was_at_by(item, self._first_at(reached), since - item.params[0])
+        return self._progress.was_at_by(
+            item, self._first_at(reached), max(since, reported - item.params[0]))
 
     def _credit_repeated(self, reached: _Reached, before: Item | None, after: Item | None,
                          start: int) -> float | None:
         """As `_credit_old`, where only a new one among repetitions of an older one counts."""
         progress, seq, last = self._progress, reached.seq, reached.last
-        if after is not None and seq == start and progress.was_exactly_at(after, last):
+        if after is not None and seq == start and progress.was_exactly_at(
+                after, last, self._new_since):
             return last
         if before is not None and seq == progress.current and (
                 progress.was_exactly_at(before, last)):
             progress.credit(before)
         return None
 
-    def replay(self, of_new: list[tuple[int, float, int]], plan: int, stored: int | None) -> None:
+    def replay(self, of_new: list[tuple[int, float, int]], plan: int) -> None:
         """Pass on what is of the new mission, in the order in which it was sent.
 
         Args:
             of_new: what `begin_new` has returned.
             plan: mission id of the new mission (PX4); 0: none.
-            stored: frame number from which it was on board; None: not known.
         """
+        stored = self.sent_frame
         currents = [each for each in self._currents if (
             each.plan == plan if plan else not each.plan and stored is not None
             and each.frame > stored)]
         self._currents.clear()
-        rows = [(frame, 0, seq, when, True) for seq, when, frame in of_new]
-        rows += [(each.frame, 1, each.seq, each.now, each.flying) for each in currents]
-        for frame, kind, seq, when, flying in sorted(rows):
-            if kind:
-                self._progress.note_current(seq, when, flying, frame)
-            else:
-                self._progress.note_reached(seq, when, proven=True, frame=frame)
+        rows = [_Passed(frame, False, seq, when, True) for seq, when, frame in of_new]
+        rows += [_Passed(each.frame, True, each.seq, each.now, each.flying) for each in currents]
+        self._passed = sorted(rows)
+        for each in self._passed:
+            self._pass_on(each, proven=True)
 
     def credit(self, uploaded: MissionDiff) -> None:
         """Credit all by the positions after a failed transfer: either mission may be flown."""

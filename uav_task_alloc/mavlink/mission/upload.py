@@ -124,6 +124,8 @@ class Upload:
         self.uploads = 0  # started so far
         self.is_superseded: Callable[[], bool] = lambda: False  # it would not be retried unchanged
         self.may_end: Callable[[], bool] = lambda: True  # its last item may be sent
+        # called with items read back that are not those accepted, and the time [s]
+        self.on_difference: Callable[[tuple[Item, ...], float], object] = lambda held, now: None
         self._out: list[Message] = []
         self._pending: Mission | None = None
         self._read_pending = False
@@ -337,6 +339,8 @@ class Upload:
             self._fail('accepted, but no mission is on board: infeasible')
             self._go(UploadEvent.UNREAD, now)
         elif done:
+            if self._accepted:
+                self.on_difference(held, now)
             self._go(UploadEvent.MISMATCH, now)
         else:
             self._fail('the mission could not be read back')

@@ -47,6 +47,7 @@ class VerifiedMission:
         self.verified_at = 0.0  # [s]
         self.read_once = False  # since the vehicle was found or restarted
         self.is_foreign = False  # another station has changed a verified mission
+        self.altered = False  # the vehicle has taken other items than were sent
         self._mission_id = 0  # of the verified mission (PX4); 0: none
         self.reported_id = 0  # last reported
 
@@ -66,7 +67,8 @@ class VerifiedMission:
     def verify(self, items: tuple[Item, ...], now: float) -> None:
         """Note that these items are on board after our upload."""
         self.items, self.verified_at, self._mission_id = items, now, self.reported_id
-        self.state, self.read_once, self.is_foreign = MissionState.VERIFIED, True, False
+        self.state, self.read_once = MissionState.VERIFIED, True
+        self.is_foreign = self.altered = False
 
     def landing_place(self, origin: Origin) -> Point | None:
         """Return where the mission lands.
@@ -90,7 +92,7 @@ class VerifiedMission:
     def reset(self) -> None:
         """Drop everything: the vehicle was restarted."""
         self.items, self.state = None, MissionState.UNKNOWN
-        self.is_foreign = self.read_once = False
+        self.is_foreign = self.read_once = self.altered = False
 
     def check_current(self, message: Message, now: float) -> None:
         """Request a download where a MISSION_CURRENT does not fit the mission, or it is due."""
@@ -119,7 +121,7 @@ class VerifiedMission:
         """
         if known and all_alike(known, items):
             self.items, self.verified_at = known, now
-            if self.state is MissionState.UNKNOWN:
+            if self.state is MissionState.UNKNOWN and not self.altered:
                 self.state = MissionState.VERIFIED
             return False
         self.items, self.verified_at, self._mission_id = items, now, self.reported_id
