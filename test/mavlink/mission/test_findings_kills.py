@@ -69,26 +69,27 @@ def test_a_task_passed_in_a_cut_in_which_the_mission_was_left_survives_a_kill(ki
 
 
 @BOTH
+@pytest.mark.parametrize('failsafe', ['radio', 'ekf'])  # without a position
 @pytest.mark.parametrize('flown', [True, False])
 def test_a_task_passed_in_a_cut_in_which_the_bridge_was_killed_and_the_mission_left_is_known(
-        kind, flown):
+        kind, flown, failsafe):
     bench = flying(kind, 'ABC')
     bench.run(lambda: distance(bench, AT_A) < 20.0)
     bench.line.cut = True
     if flown:
         assert bench.run(lambda: places(bench) == ['A'], 20.0)
     bench.run(limit=0.4)
-    bench.vehicles[1].failsafe('radio', MODES[kind].land)
+    bench.vehicles[1].failsafe(failsafe, MODES[kind].land)
     bench.run(limit=4.0)
     bench.line.cut = False
     bench.kill_and_restart(0.0)
     bench.assign(task_list('ABC', 2))
-    assert bench.run(lambda: bench.onboard().resume.located, 20.0)
-    bench.run(limit=2.0)
-    assert bench.completed() == ['A'] * flown
+    bench.run(limit=25.0)
+    assert bench.onboard().resume.located is (failsafe == 'radio' or not flown)
     bench.vehicles[1].failsafe_over()
-    assert bench.run(lambda: not bench.executor().telemetry.airborne, 30.0)
     bench.run(limit=8.0)
+    assert not bench.executor().telemetry.airborne
+    assert bench.completed() == ['A'] * flown
     bench.hand_over()
     flown_once_each(bench, 'ABC')
 

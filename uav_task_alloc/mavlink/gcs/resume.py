@@ -134,7 +134,9 @@ class Resume:
             self._placed(held), recorded if mission == checksum(held) else None, now)
 
     def awaits_position(self, held: tuple[Item, ...], read_at: float, now: float) -> bool:
-        """Whether what locates the vehicle is still to come; on the ground nothing is needed.
+        """Whether what locates the vehicle is still to come.
+
+        On the ground nothing is needed, unless it has passed items since the last record.
 
         Args:
             held: the items on board, without home.
@@ -144,8 +146,15 @@ class Resume:
         telemetry = self._telemetry
         if self.located or not held or (telemetry.current is not None and telemetry.has_position):
             return False
-        return telemetry.airborne or (
+        return telemetry.airborne or self._passed_unlocated(held) or (
             not telemetry.grounded and now - read_at < _LANDED_STATE_DELAY)
+
+    def _passed_unlocated(self, held: tuple[Item, ...]) -> bool:
+        """Whether it has left mission mode past the recorded item, and no position has come."""
+        mission, recorded, _ = self.recorded
+        return bool(self._seen) and self.was_in_mission and not self._rebooted and (
+            recorded is not None and mission == checksum(held)
+            and any(each.seq > recorded for each in self._unread.currents))
 
     def locate(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
         """Locate the vehicle in its onboard mission, once.
