@@ -44,7 +44,7 @@ class ProgressTable:
 
     Arguments of methods:
         now: steady time [s].
-        seq: of an item of the mission on board.
+        seq, start: of an item of the mission on board.
         item, items: of a mission.
         sample: a position of the vehicle.
         newest: the sample did not arrive late.
