@@ -260,3 +260,39 @@ def test_one_on_its_way_home_from_rest_arrives_when_it_has_sped_up_and_braked():
 def test_one_on_its_way_home_that_got_a_task_is_predicted_on_its_way_there():
     sky = Sky({}, {'mode': 'RETURNING', 'home': (0.0, -200.0, 0.0)})
     assert sky.step() == [('u1', True)]
+
+
+def test_the_list_on_board_is_predicted_until_the_one_in_force_is():
+    sky = Sky()
+    lists = sky.world.lists.lists
+    revision = lists['u2'].revision
+    for each in sky.more:
+        each['list_revision'] = revision
+    sky.report((-250.0, 0.0, 50.0))
+    assert sky.step() == []
+    away = Task('t9', (0.0, -300.0, 50.0), allowed_uavs=frozenset({'u2'}))
+    sky.add(away)
+    lists['u2'] = replace(lists['u2'], revision=revision + 1, stops=(
+        replace(lists['u2'].stops[0], task=away, begin_after=0.0),))
+    sky.report()
+    assert sky.step() == [('u1', True)]
+    sky.more[1]['list_revision'] = revision + 1
+    sky.more[1]['velocity'] = (0.0, -15.0, 0.0)
+    sky.report()
+    assert sky.step() == [('u1', False)]
+
+
+def test_a_list_on_board_is_not_flown_while_a_uav_stands_for_an_upload():
+    sky = Sky()
+    lists = sky.world.lists.lists
+    for each in sky.more:
+        each['list_revision'] = lists['u2'].revision
+    sky.report((-250.0, 0.0, 50.0))
+    assert sky.step() == []
+    away = Task('t9', (0.0, -300.0, 50.0), allowed_uavs=frozenset({'u2'}))
+    sky.add(away)
+    lists['u2'] = replace(lists['u2'], revision=lists['u2'].revision + 1, stops=(
+        replace(lists['u2'].stops[0], task=away, begin_after=0.0),))
+    sky.more[1] |= {'mode': 'HOLD', 'velocity': (0.0, 0.0, 0.0)}
+    sky.report()
+    assert sky.step() == []

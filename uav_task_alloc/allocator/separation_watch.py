@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
-from uav_task_alloc.allocator.records import ListStop
+from uav_task_alloc.allocator.records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.state.fleet import UavRecord
-from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight, timed_stops
 from uav_task_alloc.allocator.state.way_times import timed_points
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed
@@ -33,6 +34,7 @@ _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
 _MOVES, _CLIMBS = 2.0, 0.5  # [m/s] more than that: it does not hover; it does not fly level
 _TOWARDS = math.cos(math.radians(15.0))  # of the course and the direction of home
+_MOST_SENT = 50  # lists of a UAV that are kept
 _CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
 _FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
 _OURS = ('', 'UNKNOWN', 'HELD')  # authority over a UAV in the air that flies its list
@@ -50,6 +52,8 @@ class SeparationWatch:
         self._world, self.monitor = world, SeparationMonitor()
         self._stepped = -math.inf  # [s] published clock
         self._silent: dict[str, float] = {}  # by id: published clock [s] when it was found silent
+        # by id and revision: lists in force, and before, that may be on board
+        self._sent: dict[str, dict[int, UavList]] = {}
 
     def step(self, now: float, stamp: float, lists_changed: bool) -> MonitorStep:
         """Predict and decide, where it is time or lists have changed.
@@ -67,6 +71,7 @@ class SeparationWatch:
         if not due or not (rule.on or self.monitor.holding or self.monitor.alerts):
             return MonitorStep()
         self._stepped = stamp
+        self._note_lists()
         uavs = {uav_id: each for uav_id, record in self._world.uav_records().items()
                 if (each := self._monitored(uav_id, record, stamp)) is not None}
         step = self.monitor.step(stamp, uavs, rule)
@@ -99,7 +104,8 @@ class SeparationWatch:
             stops = self._stops(uav_id, stamp, flight)
             if not stops or is_held or not self._world.usable(uav_id):
                 return None
-            way = self._way(record, self._list_points(uav_id, stops, flight, True))
+            way = self._way(record, self._list_points(self._world.list_of(uav_id), stops, flight,
+                                                      True))
             return MonitoredUav(way, (_WAITS, -stops[0].start), early=True)
         if record.silent or report.foreign or report.mode == 'FAULT' or (
                 report.authority not in _OURS):
@@ -110,7 +116,36 @@ class SeparationWatch:
         if is_held:
             return MonitoredUav(self._way(record, [(0.0, report.position)]), (_HELD,), False,
                                 f'an operator holds {uav_id}')
-        return self._flying(uav_id, record, flight, stamp)
+        each = self._flying(uav_id, record, flight, stamp)
+        return replace(each, way=replace(each.way, on_board=tuple(
+            self._on_board(uav_id, record, flight))))
+
+    def _note_lists(self) -> None:
+        """Keep the list that a UAV reports to be on board, and those that may follow it."""
+        for uav_id, record in self._world.uav_records().items():
+            kept, current = self._sent.setdefault(uav_id, {}), self._world.list_of(uav_id)
+            kept[current.revision] = current
+            reported = record.report.list_revision
+            for revision in [*kept]:
+                if revision < reported or (
+                        len(kept) > _MOST_SENT and revision not in (reported, current.revision)):
+                    del kept[revision]
+
+    def _on_board(self, uav_id: str, record: UavRecord, flight: UavFlight) -> _TimedPoints:
+        """Where the list on board takes a UAV until the one in force is; []: that is, or it stays.
+
+        An autopilot flies its mission on during an upload, which may take long or begin again.
+        """
+        report, current = record.report, self._world.list_of(uav_id)
+        each = self._sent.get(uav_id, {}).get(report.list_revision, current)
+        if each.revision == current.revision or report.mode not in ('ON_MISSION', 'RETURNING'):
+            return []
+        stops = [stop for stop in timed_stops(each.stops, flight)
+                 if self._world.tasks.is_open(stop.task.id)]
+        begin = next((k for k, stop in enumerate(stops) if stop.task.id == report.active_task), 0)
+        if stops:
+            return self._list_points(each, stops[begin:], flight)
+        return self._way_home(each, record, flight) if each.returns else []
 
     def _silent_for(self, uav_id: str, record: UavRecord, stamp: float) -> float:
         """For how long a UAV has been known to be silent [s], of the published clock."""
@@ -140,10 +175,11 @@ class SeparationWatch:
             return MonitoredUav(self._way(record, points), (_URGENT,), False,
                                 f'{uav_id} takes off')
         if record.low or returns:
-            way = self._way(record, self._way_home(uav_id, record, flight))
+            way = self._way(record, self._way_home(self._world.list_of(uav_id), record,
+                                                   flight))
             return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
                                 f'{uav_id} is low on battery' if record.low else '', early=True)
-        points = self._list_points(uav_id, stops, flight)
+        points = self._list_points(self._world.list_of(uav_id), stops, flight)
         to_place = () if stops else self._way_to_place(uav_id, place)
         if to_place:
             points = _along([(0.0, place)], to_place, flight.pace, flight.share(to_place[0]))
@@ -161,9 +197,9 @@ class SeparationWatch:
             return ()
         return each.end_via[points_passed(place, each.end_via):]
 
-    def _way_home(self, uav_id: str, record: UavRecord, flight: UavFlight) -> _TimedPoints:
-        """The points of its list on the way home that are ahead, else its own return."""
-        via, place = self._world.list_of(uav_id).end_via, flight.position
+    def _way_home(self, each: UavList, record: UavRecord, flight: UavFlight) -> _TimedPoints:
+        """The points of a list on the way home that are ahead, else its own return."""
+        via, place = each.end_via, flight.position
         if not via:
             return _own_return(record, flight.pace)
         ahead = via[points_passed(place, via):]
@@ -180,10 +216,10 @@ class SeparationWatch:
         return tuple(stop for stop in self._world.lists.restamped(uav_id, stamp, flight).stops
                      if self._world.tasks.is_open(stop.task.id))
 
-    def _list_points(self, uav_id: str, stops: Sequence[ListStop], flight: UavFlight,
+    def _list_points(self, each: UavList, stops: Sequence[ListStop], flight: UavFlight,
                      climbs: bool = False) -> _TimedPoints:
-        """Where a UAV is and when [s from now], along the stops of the next 30 s."""
-        record = self._world.uav_records()[uav_id]
+        """Where a UAV is and when [s from now], along the stops of a list in the next 30 s."""
+        record = self._world.uav_records()[each.uav]
         place = flight.position
         clock = _ARMING if flight.on_ground else 0.0
         points = [(0.0, place), (clock, place)]
@@ -209,7 +245,6 @@ class SeparationWatch:
             points.append((clock, place))
             if clock > HORIZON:
                 return points
-        each = self._world.list_of(uav_id)
         return _home(points, record, flight.pace, each.end_via) if each.returns else points
 
 

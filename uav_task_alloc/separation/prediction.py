@@ -25,6 +25,7 @@ _SOONER = 0.5  # [s] by which a loss begins earlier
 _CLOSER = 0.1  # share of the distances by which a loss is worse
 # times the horizontal distance, and [s] more of time, that a UAV needs to go on
 _CAUTION, _PATIENCE = 1.15, 2.0
+_ON_BOARD = 10.0  # [s] for which a list that is to be replaced counts: a hold takes 7 s
 _Floats = NDArray[np.float64]
 _Flags = NDArray[np.bool_]
 
@@ -38,6 +39,8 @@ class Way:
     on_ground: bool = False  # it is about to take off: where it holds it is not in the air
     hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
     pad: Point | None = None  # [m] where it takes off and lands; None: unknown
+    # its points by the list that is still on board, until the new one is; (): there is none
+    on_board: tuple[tuple[float, Point], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +70,9 @@ class FlightPredictions:
                  holding: Collection[str] = ()) -> None:
         self._ways, self._rule = ways, rule
         self._times: _Floats = np.arange(0.0, HORIZON + _DT, _DT)
-        self._go = {name: _sampled(way, self._times) for name, way in ways.items()}
-        self._stay = {name: _sampled(way, _stopping(way, self._times, name in holding),
-                                     holds=True) for name, way in ways.items()}
+        self._go = {name: _paths(way, self._times) for name, way in ways.items()}
+        self._stay = {name: _paths(way, _stopping(way, self._times, name in holding), holds=True)
+                      for name, way in ways.items()}
         self._holding = set(holding)
 
     def set_holding(self, uav_id: str, holds: bool) -> None:
@@ -89,7 +92,7 @@ class FlightPredictions:
         """Return the pairs that are not apart now."""
         found = {}
         for a, b in self._near_pairs():
-            one, two = self._path(a, a in self._holding), self._path(b, b in self._holding)
+            one, two = (self._paths(name, name in self._holding)[0] for name in (a, b))
             apart = math.hypot(one[0, 0] - two[0, 0], one[0, 1] - two[0, 1])
             above = abs(float(one[0, 2] - two[0, 2]))
             if not self._rule.keeps(apart, above) and not (
@@ -104,21 +107,19 @@ class FlightPredictions:
             uav_id, holds: see the class.
             wide: with some more distance.
         """
-        own = self._path(uav_id, holds)
         found = {}
         for other in self._ways:
             if other != uav_id:
                 # as well without it: two that are nearer than the wide distance may fly on
-                loss = self._between(uav_id, own, holds, other) or (
-                    self._between(uav_id, own, holds, other, wide=True) if wide else None)
+                loss = self._between(uav_id, holds, other) or (
+                    self._between(uav_id, holds, other, wide=True) if wide else None)
                 if loss is not None:
                     found[other] = loss
         return found
 
     def loss(self, uav_id: str, other: str) -> PredictedLoss | None:
         """Return the loss of two UAVs, with the present holds; None: they stay apart."""
-        holds = uav_id in self._holding
-        return self._between(uav_id, self._path(uav_id, holds), holds, other)
+        return self._between(uav_id, uav_id in self._holding, other)
 
     def helps(self, uav_id: str, other: str) -> bool:
         """Return whether the hold of a UAV keeps it apart from another one, and from the rest.
@@ -137,7 +138,7 @@ class FlightPredictions:
             stops: those of the pair that hold.
         """
         a, b = pair
-        stopped = self._between(a, self._path(a, a in stops or a in self._holding), a in stops, b,
+        stopped = self._between(a, a in stops or a in self._holding, b,
                                 other_holds=b in stops or b in self._holding)
         current = self.loss(a, b)
         return stopped is None or (current is not None
@@ -145,22 +146,26 @@ class FlightPredictions:
                                    and stopped.begins > current.begins - _SOONER
                                    and stopped.share > current.share - _CLOSER)
 
-    def _path(self, uav_id: str, holds: bool) -> _Floats:
+    def _paths(self, uav_id: str, holds: bool) -> list[_Floats]:
         return (self._stay if holds else self._go)[uav_id]
 
-    def _between(self, uav_id: str, own: _Floats, holds: bool, other: str,
-                 wide: bool = False, other_holds: bool | None = None) -> PredictedLoss | None:
+    def _between(self, uav_id: str, holds: bool, other: str, wide: bool = False,
+                 other_holds: bool | None = None) -> PredictedLoss | None:
+        """The loss of two UAVs, the first one of their paths; each may have two."""
         if other_holds is None:
             other_holds = other in self._holding
-        theirs = self._path(other, other_holds)
         horizontal = self._rule.horizontal * (_CAUTION if wide else 1.0) + _MARGIN
         horizontal += 2.0 * (holds * self._ways[uav_id].hold_radius
                              + other_holds * self._ways[other].hold_radius)
         shifts = round((self._rule.time + wide * _PATIENCE) / _DT)
         if holds and other_holds:
             shifts = 0
-        return _first_loss(own, theirs, horizontal, self._rule.vertical - _SLACK, shifts,
-                           self._on_pad(uav_id, own), self._on_pad(other, theirs))
+        losses = [_first_loss(own, theirs, horizontal, self._rule.vertical - _SLACK, shifts,
+                              self._on_pad(uav_id, own), self._on_pad(other, theirs))
+                  for own in self._paths(uav_id, holds)
+                  for theirs in self._paths(other, other_holds)]
+        return min((loss for loss in losses if loss is not None),
+                   key=lambda loss: (loss.begins, loss.horizontal), default=None)
 
     def _on_pad(self, uav_id: str, path: _Floats) -> _Flags:
         """Where on a path it is low over its pad: pads may be nearer than the rule."""
@@ -178,8 +183,8 @@ class FlightPredictions:
             return []
         reach = self._rule.horizontal + _MARGIN
         low, high = (np.array([
-            bound(bound(self._go[name], axis=0), bound(self._stay[name], axis=0))
-            for name in names]) for bound in (_least, _most))
+            bound(np.concatenate([*self._go[name], *self._stay[name]]), axis=0)
+            for name in names]) for bound in (np.fmin.reduce, np.fmax.reduce))
         radius = np.array([2.0 * self._ways[name].hold_radius for name in names])[:, None]
         room = np.array([reach, reach, self._rule.vertical])
         low, high = low - 0.5 * room - radius, high + 0.5 * room + radius
@@ -187,20 +192,20 @@ class FlightPredictions:
                 if bool(np.all(low[i] <= high[j]) and np.all(low[j] <= high[i]))]
 
 
-def _least(a: _Floats, b: _Floats | None = None, axis: int | None = None) -> _Floats:
-    return np.asarray(np.fmin.reduce(a, axis=axis or 0) if b is None else np.fmin(a, b))
-
-
-def _most(a: _Floats, b: _Floats | None = None, axis: int | None = None) -> _Floats:
-    return np.asarray(np.fmax.reduce(a, axis=axis or 0) if b is None else np.fmax(a, b))
-
-
-def _sampled(way: Way, times: _Floats, holds: bool = False) -> _Floats:
-    """Points (n, 3) of a way at times [s]; NaN: it is not in the air."""
+def _paths(way: Way, times: _Floats, holds: bool = False) -> list[_Floats]:
+    """The points (n, 3) of a way at times [s], and those by the list on board; NaN: nowhere."""
     if holds and way.on_ground:
-        return np.full((len(times), 3), math.nan)
-    at = np.array([t for t, _ in way.points])
-    points = np.array([point for _, point in way.points], dtype=float)
+        return [np.full((len(times), 3), math.nan)]
+    paths = [_sampled(way.points, times)]
+    if way.on_board:
+        paths.append(_sampled(way.on_board, times))
+        paths[1][round(_ON_BOARD / _DT):] = math.nan
+    return paths
+
+
+def _sampled(way: Sequence[tuple[float, Point]], times: _Floats) -> _Floats:
+    at = np.array([t for t, _ in way])
+    points = np.array([point for _, point in way], dtype=float)
     return np.stack([np.interp(times, at, points[:, k]) for k in range(3)], axis=1)
 
 
