@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Landing, `relaunch`, and arming by others."""
+import math
+
 import pytest
 from authority_bench import (
     BOTH,
     MODES,
+    PX4,
     AuthorityBench,
     H,
     L,
@@ -18,6 +21,7 @@ from authority_bench import (
     sends_no_command,
     status_is,
 )
+from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -71,6 +75,35 @@ def test_a_landing_by_our_return_while_suspended_is_a_loss(kind):
     bench.vehicles[1].failsafe('radio', None)
     assert bench.reaches(S)
     assert bench.reaches(L, 60.0)
+    assert sends_no_command(bench, 20.0)
+
+
+@PX4
+@pytest.mark.parametrize('late', [0.0, 0.6, 2.0])
+def test_a_return_of_the_mission_that_an_upload_has_just_replaced_is_ours(kind, late):
+    """Before a heartbeat shows its mode, and perhaps before the last REACHED is received."""
+    bench = AuthorityBench(kind).discover()
+    bench.assign(task_list('A', 1, returns=True))
+    flight = bench.vehicles[1].flight
+    bench.line.tampers.append(lambda direction, m, now: {
+        'HEARTBEAT': [(0.9, m)], 'MISSION_ITEM_REACHED': [(late, m)]}.get(m.get_type()))
+    assert bench.run(lambda: math.dist(flight.body.position, (0.0, 100.0, 50.0)) < 5.0, 60.0)
+    bench.assign(task_list('AB', 2, returns=True))  # its upload waits until A is served
+    assert bench.run(lambda: flight.custom_mode == MODES[kind].rtl, 60.0)
+    assert bench.run(lambda: 'B' in bench.completed(), 60.0)
+    assert places(bench) == ['A', 'B']
+    assert bench.authority() is H
+
+
+@PX4
+def test_a_return_just_after_an_upload_that_replaced_no_return_is_a_loss(kind):
+    bench = AuthorityBench(kind).discover()
+    bench.assign(task_list('AC', 1, returns=True))
+    assert bench.run(lambda: bench.completed() == ['A'], 60.0)
+    bench.assign(task_list('B', 2, returns=True))
+    assert bench.run(lambda: bench.onboard().revision == 2, 5.0)
+    bench.vehicles[1].rc_mode(MODES[kind].rtl)
+    assert bench.reaches(L, 10.0)
     assert sends_no_command(bench, 20.0)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.autopilots import ModeFunction
 from uav_task_alloc.mavlink.gcs.authority import TaskMark
 from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.resume import checksum
@@ -46,9 +47,25 @@ class MissionEvidence:
         return progress.returns and progress.current is not None and (
             progress.current > progress.last_flown)
 
+    def returned_before(self, now: float, since: float) -> bool:
+        """Whether the mission that was just replaced had come to its return.
+
+        Args:
+            now: steady time [s].
+            since: from which [s] a REACHED of its last item counts.
+        """
+        progress = self._onboard.progress
+        return progress.previous_returned(now, progress.ended_at >= since)
+
     def has_landed(self) -> bool:
         """Whether the mission has ended with a landing (PX4, which then changes to Hold)."""
         return self._onboard.progress.finished and self.returning()
+
+    def holds_at_end(self) -> bool:
+        """Whether it holds in the air after the last item of a mission that does not return."""
+        progress, telemetry = self._onboard.progress, self._telemetry
+        return (progress.finished and not progress.returns and telemetry.airborne
+                and telemetry.mode is ModeFunction.HOLD)
 
     def may_end(self) -> bool:
         """Whether the last item with a position is being flown, or is passed."""

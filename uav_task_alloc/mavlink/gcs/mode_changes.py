@@ -186,7 +186,9 @@ class ModeChanges:
             return (self._evidence.ended(max(since, now - LATE_REACHED))
                     or self._evidence.rejected(now)
                     or self._state.texts.mission_ended(now, since))
-        return self._state.is_return(mode) and self._evidence.returning()
+        return self._state.is_return(mode) and (
+            self._evidence.returning()
+            or self._evidence.returned_before(now, self._state.in_mission_since))
 
     def _mission_may_have_ended(self, mode: int) -> bool:
         """Whether it may have ended, with the message that reports it delayed (PX4)."""

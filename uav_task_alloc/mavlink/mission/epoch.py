@@ -46,6 +46,11 @@ class Epoch:
         return len(self.items) - 1 - int(self.returns)
 
     @property
+    def returning(self) -> bool:
+        """Whether the item that returns or lands is next, is being flown, or is flown."""
+        return self.returns and self.current is not None and self.current > self.last_flown
+
+    @property
     def last_reached(self) -> int:
         """The index of the item at whose REACHED PX4 leaves the mission mode for Hold."""
         lands = bool(self.items) and self.items[-1].command == dialect.MAV_CMD_NAV_LAND

@@ -70,7 +70,7 @@ class ProgressTable:
             self._epoch, self._tasks, self.positions, self._epochs, self._moves, repeats)
         self.end_before_restart = EndBeforeRestart(
             self._epoch, self._tasks, self.positions, self._moves)
-        self.path = self.positions.path
+        self.path, self.previous_returned = self.positions.path, self._epochs.has_returned
 
     @property
     def epoch(self) -> int:
@@ -189,7 +189,7 @@ class ProgressTable:
         if (epoch.items or read) and not all_alike(epoch.items, items):
             self._epochs.begin(PreviousEpoch(
                 epoch.items, epoch.since, self.positions.vehicle_time(now), self.may_end(now),
-                now + REPEAT_WINDOW, epoch.taken))
+                now + REPEAT_WINDOW, epoch.taken, epoch.returning))
             self.coverage.note_replaced(
                 items[start] if start is not None and start < len(items) else None)
         epoch.items, epoch.current = items, start

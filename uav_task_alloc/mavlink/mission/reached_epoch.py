@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.position_history import (
     LOOSE_RADIUS,
@@ -30,6 +32,7 @@ class PreviousEpoch:
     may_end: bool  # it was at its last item
     until: float  # [s] until when a REACHED may be of it
     taken: float = -math.inf  # vehicle time [s] before which it was not on board
+    returning: bool = False  # the item that returns was next, or was being flown
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +78,16 @@ class ReachedEpoch:
     def may_have_ended(self, now: float) -> bool:
         """Whether the previous epoch was at its last item, and has just ended."""
         return self.before.may_end and now < self.before.until - REPEAT_WINDOW + MAX_MESSAGE_DELAY
+
+    def has_returned(self, now: float, reached: bool) -> bool:
+        """Whether the previous epoch has ended a moment ago with the return of the vehicle.
+
+        Args:
+            now: steady time [s].
+            reached: a REACHED shows that it came to its last item.
+        """
+        return self.may_have_ended(now) and (reached or self.before.returning) and (
+            self.before.items[-1].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 
     def is_of_current(self, reached: ReachedReport, epoch: CurrentEpoch, now: float) -> bool:
         """Whether a REACHED that may be of the previous epoch is of the current one.
