@@ -286,8 +286,7 @@ def test_a_climb_that_ended_while_no_bridge_ran_leaves_it_held(kind, height, sec
     bench = killed_in_climb(kind, height)
     bench.run(limit=seconds)
     assert bench.vehicles[1].flight.custom_mode == MODES[kind].hold
-    bench.start()
-    bench.discover()
+    bench.kill_and_restart()
     assert bench.reaches(H, 5.0)
     assert status_is(bench, H, 'the vehicle is in Hold')
     bench.assign(task_list('AB'))
@@ -306,8 +305,7 @@ def test_a_climb_after_which_somebody_moved_it_while_no_bridge_ran_is_a_loss(kin
     vehicle.rc_stick(None)
     bench.run(limit=3.0)
     vehicle.rc_mode(MODES[kind].hold)
-    bench.start()
-    bench.discover()
+    bench.kill_and_restart()
     assert bench.reaches(L, 5.0)
     assert status_is(bench, L, 'the vehicle is in Hold')
     assert sends_no_command(bench, names='AB')
@@ -319,8 +317,7 @@ def test_a_climb_whose_end_is_not_shown_after_a_restart_is_a_loss(kind, missing)
     bench = killed_in_climb(kind, 20.0)
     bench.run(limit=20.0)
     bench.line.tampers.append(lambda direction, m, now: [] if m.get_type() == missing else None)
-    bench.start()
-    bench.discover()
+    bench.kill_and_restart()
     bench.run(limit=8.0)
     assert bench.authority() is S
     assert bench.reaches(L, 5.0)
@@ -332,8 +329,7 @@ def test_a_climb_that_is_ended_while_no_bridge_runs_below_its_height_is_a_loss(k
     bench = killed_in_climb(kind, 10.0)
     bench.vehicles[1].rc_mode(MODES[kind].hold)
     bench.run(limit=10.0)
-    bench.start()
-    bench.discover()
+    bench.kill_and_restart()
     assert bench.reaches(L, 5.0)
     assert sends_no_command(bench, names='AB')
 
@@ -348,3 +344,57 @@ def test_a_climb_that_a_pilot_ends_below_its_height_is_a_loss(kind):
     bench.run(limit=8.0)
     assert status_is(bench, L, 'Takeoff -> Hold')
     assert sends_no_command(bench, names='AB')
+
+
+# the end of a mission without a return
+
+@PX4
+def test_a_mission_that_ended_while_no_bridge_ran_leaves_it_held(kind):
+    bench = flying(kind, 'AB')
+    bench.kill_and_restart(60.0)
+    bench.assign(task_list('ABC', 2))
+    assert bench.reaches(H, 5.0)
+    assert status_is(bench, H, 'holds at the end of our mission')
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'], 60.0)
+
+
+@PX4
+@pytest.mark.parametrize('moved', [(8.0, 0.0, 0.0), (0.0, 0.0, 8.0)])
+def test_a_mission_that_ended_and_after_which_it_was_moved_is_a_loss(kind, moved):
+    bench = flying(kind, 'AB')
+    bench.kill()
+    bench.run(limit=60.0)
+    vehicle = bench.vehicles[1]
+    vehicle.rc_mode(MODES[kind].stick)
+    vehicle.rc_stick(moved)
+    bench.run(limit=5.0)
+    vehicle.rc_stick(None)
+    bench.run(limit=5.0)
+    vehicle.rc_mode(MODES[kind].hold)
+    bench.kill_and_restart()
+    assert sends_no_command(bench, names='ABC')
+    assert status_is(bench, L, 'the vehicle is in Hold')
+
+
+@PX4
+def test_a_mission_that_somebody_stopped_while_no_bridge_ran_is_a_loss(kind):
+    bench = flying(kind, 'AB')
+    bench.kill()
+    bench.vehicles[1].rc_mode(MODES[kind].hold)
+    bench.run(limit=10.0)
+    bench.kill_and_restart()
+    assert sends_no_command(bench, names='ABC')
+    assert status_is(bench, L, 'the vehicle is in Hold')
+
+
+@PX4
+def test_a_mission_that_ended_is_a_loss_once_somebody_has_changed_the_mode(kind):
+    bench = flying(kind, 'AB')
+    bench.kill_and_restart(60.0)
+    bench.run(limit=2.0)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    bench.run(limit=2.0)
+    bench.vehicles[1].rc_mode(MODES[kind].hold)
+    bench.assign(task_list('ABC', 2))
+    bench.run(limit=3.0)
+    assert status_is(bench, L)

@@ -80,7 +80,7 @@ class AuthorityEvent(Enum):
         'at rest; after our take-off, PX4: in Hold at its height over home)'
     RESTART_DIFFERS = 'restart of the bridge, its file does not agree'
     RESTART_OURS = 'restart, airborne with our mission: in MISSION without a file, or in RETURN ' \
-        '(PX4) at the end of the mission in its file'
+        'or Hold (PX4) at the end of the mission in its file'
     RESTART_AIRBORNE = 'restart without a file: otherwise airborne'
     FOREIGN = 'FOREIGN mission with `when_foreign: yield`'
     FOREIGN_OVER = 'our mission is on board again'

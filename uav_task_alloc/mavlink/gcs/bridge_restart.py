@@ -35,6 +35,7 @@ class BridgeRestart:
         self._first_at: float | None = None  # [s] the first heartbeat of this run
         self._armed_at_start = False  # it was armed before the bridge started
         self._mission: int | None = None  # checksum of one that may have ended while it was down
+        self._held_in: int | None = None  # custom_mode, of a HOLD that may be its end
         self._landed_in: int | None = None  # custom_mode, of a landing of its own meanwhile
         if record is None:
             state.authority.undecided = True
@@ -90,8 +91,10 @@ class BridgeRestart:
             return
         if state.armed:
             modes = map(state.class_of, (record.mode, *record.commanded))
-            if ModeClass.MISSION in modes and state.is_return(state.mode):
+            holds = state.profile.atomic and state.class_of(state.mode) is ModeClass.HOLD
+            if ModeClass.MISSION in modes and (holds or state.is_return(state.mode)):
                 self._mission = record.mission
+                self._held_in = state.mode if holds else None
         elif state.mode == record.mode or (  # PX4 changes to Hold when it has landed
                 state.is_return(record.mode) and state.class_of(state.mode) is ModeClass.HOLD):
             self._landed_in = state.mode
@@ -149,15 +152,27 @@ class BridgeRestart:
         state, authority = self._state, self._state.authority
         if authority.state is not AuthorityState.LOST:
             return
-        if self._mission is not None and (
-                self._mission == self._evidence.mission_position()[0]
-                and state.is_return(state.mode) and self._evidence.returning()):
+        if self._mission is not None and self._mission_has_ended(now):
             self._mission = None
-            state.apply(AuthorityEvent.RESTART_OURS, now, 'returns at the end of our mission')
+            what = 'returns' if state.is_return(state.mode) else 'holds'
+            state.apply(AuthorityEvent.RESTART_OURS, now, f'{what} at the end of our mission')
         if self._landed_in is not None and state.telemetry.battery >= 0.0:
             if state.mode == self._landed_in and not state.armed and state.telemetry.grounded:
                 state.landed_battery = state.telemetry.battery
             self._landed_in = None
+
+    def _mission_has_ended(self, now: float) -> bool:
+        """Whether it has returned, or held, since the end of the mission in its record (PX4)."""
+        state, evidence = self._state, self._evidence
+        holds = self._held_in is not None
+        if holds and (state.mode != self._held_in or state.failsafe_active(now)):
+            self._mission = None  # somebody else has it
+            return False
+        if self._mission != evidence.mission_position()[0]:
+            return False
+        if not holds:
+            return state.is_return(state.mode) and evidence.returning()
+        return evidence.holds_at_end() and state.telemetry.speed < REST_SPEED
 
     def _decide_without_record(self, now: float) -> None:
         """Decide after a start without a record: on the ground, or airborne."""
