@@ -262,37 +262,44 @@ def test_one_on_its_way_home_that_got_a_task_is_predicted_on_its_way_there():
     assert sky.step() == [('u1', True)]
 
 
+class SkyWithNewList(Sky):
+    """The list on board of u2 is the one before that in force, which leads it to `place`."""
+
+    def __init__(self, place):
+        super().__init__()
+        lists = self.world.lists.lists
+        self.revision = lists['u2'].revision
+        for each in self.more:
+            each['list_revision'] = self.revision
+        self.report((-300.0, 0.0, 50.0))
+        assert self.step() == []
+        away = Task('t9', place, allowed_uavs=frozenset({'u2'}))
+        self.add(away)
+        lists['u2'] = replace(lists['u2'], revision=self.revision + 1, stops=(
+            replace(lists['u2'].stops[0], task=away, begin_after=0.0),))
+
+
 def test_the_list_on_board_is_predicted_until_the_one_in_force_is():
-    sky = Sky()
-    lists = sky.world.lists.lists
-    revision = lists['u2'].revision
-    for each in sky.more:
-        each['list_revision'] = revision
-    sky.report((-250.0, 0.0, 50.0))
-    assert sky.step() == []
-    away = Task('t9', (0.0, -300.0, 50.0), allowed_uavs=frozenset({'u2'}))
-    sky.add(away)
-    lists['u2'] = replace(lists['u2'], revision=revision + 1, stops=(
-        replace(lists['u2'].stops[0], task=away, begin_after=0.0),))
+    sky = SkyWithNewList((0.0, -300.0, 50.0))
     sky.report()
     assert sky.step() == [('u1', True)]
-    sky.more[1]['list_revision'] = revision + 1
-    sky.more[1]['velocity'] = (0.0, -15.0, 0.0)
+    sky.more[1] |= {'list_revision': sky.revision + 1, 'velocity': (0.0, -15.0, 0.0)}
     sky.report()
     assert sky.step() == [('u1', False)]
 
 
 def test_a_list_on_board_is_not_flown_while_a_uav_stands_for_an_upload():
-    sky = Sky()
-    lists = sky.world.lists.lists
-    for each in sky.more:
-        each['list_revision'] = lists['u2'].revision
-    sky.report((-250.0, 0.0, 50.0))
-    assert sky.step() == []
-    away = Task('t9', (0.0, -300.0, 50.0), allowed_uavs=frozenset({'u2'}))
-    sky.add(away)
-    lists['u2'] = replace(lists['u2'], revision=lists['u2'].revision + 1, stops=(
-        replace(lists['u2'].stops[0], task=away, begin_after=0.0),))
+    sky = SkyWithNewList((0.0, -300.0, 50.0))
     sky.more[1] |= {'mode': 'HOLD', 'velocity': (0.0, 0.0, 0.0)}
     sky.report()
     assert sky.step() == []
+
+
+def test_one_that_stands_for_an_upload_is_in_the_way_until_its_list_is_on_board():
+    sky = SkyWithNewList((0.0, 300.0, 50.0))
+    sky.more[1] |= {'mode': 'HOLD', 'velocity': (0.0, 0.0, 0.0)}
+    sky.report((-140.0, 0.0, 50.0), (0.0, 0.0, 50.0))
+    assert sky.step() == [('u1', True)]
+    sky.more[1] |= {'mode': 'ON_MISSION', 'list_revision': sky.revision + 1}
+    sky.report((-140.0, 0.0, 50.0), (0.0, 0.0, 50.0))
+    assert sky.step() == [('u1', False)]

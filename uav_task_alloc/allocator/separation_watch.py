@@ -132,13 +132,18 @@ class SeparationWatch:
                     del kept[revision]
 
     def _on_board(self, uav_id: str, record: UavRecord, flight: UavFlight) -> _TimedPoints:
-        """Where the list on board takes a UAV until the one in force is; []: that is, or it stays.
+        """Where a UAV is until the list in force is on board; []: it is, or nothing is known.
 
-        An autopilot flies its mission on during an upload, which may take long or begin again.
+        During an upload, which may take long or begin again, one autopilot flies its mission on,
+        and another one stands.
         """
-        report, current = record.report, self._world.list_of(uav_id)
-        each = self._sent.get(uav_id, {}).get(report.list_revision, current)
-        if each.revision == current.revision or report.mode not in ('ON_MISSION', 'RETURNING'):
+        report = record.report
+        if report.list_revision == self._world.list_of(uav_id).revision:
+            return []
+        if report.mode == 'HOLD':
+            return [(0.0, flight.position)]
+        each = self._sent.get(uav_id, {}).get(report.list_revision)
+        if each is None or report.mode not in ('ON_MISSION', 'RETURNING'):
             return []
         stops = [stop for stop in timed_stops(each.stops, flight)
                  if self._world.tasks.is_open(stop.task.id)]
