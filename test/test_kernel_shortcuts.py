@@ -15,13 +15,14 @@ import pytest
 from llvmlite import ir as llvm
 from llvmlite.ir._utils import DuplicatedNameError, NameScope
 from numba import types
-from numba.core import compiler, event, ir
+from numba.core import analysis, compiler, event, ir
 from numba.core.postproc import PostProcessor
 from numba.core.registry import cpu_target
+from numba.core.runtime import _nrt_python, rtsys
 from numba.core.targetconfig import ConfigStack
 
 from uav_task_alloc import kernel_shortcuts
-from uav_task_alloc.kernel import kernel
+from uav_task_alloc.kernel import allocating_kernel, kernel
 from uav_task_alloc.kernel_shortcuts import SHORTCUTS, Shortcut, shortcuts
 
 WHERE = ir.Loc('file', 1)
@@ -178,6 +179,58 @@ def test_variables_end_where_they_end_without(function, emit_dels):
     with shortcuts():
         assert processed() == plain
     assert ('del i' in plain[0]) == emit_dels
+
+
+def branched(n, start):
+    size = start + n
+    for i in range(n):
+        odd = i % 2
+        if odd:
+            last = i
+            size += 1
+        total = odd + size
+    return total + last
+
+
+def test_variables_are_values_where_one_assignment_precedes_all_uses():
+    blocks = compiler.run_frontend(branched).blocks
+    found = kernel_shortcuts._dominating(blocks, analysis)
+    assert {'n', 'start', 'i', 'odd'} <= found
+    assert not found & {'size', 'last', 'total'}
+    blocks[min(blocks)].prepend(ir.Del('n', WHERE))
+    assert 'n' in kernel_shortcuts._dominating(blocks, analysis)
+    del_before = next(block for block in blocks.values() if not any(
+        each.target.name in ('n', 'odd') for each in block.find_insts(ir.Assign)))
+    del_before.prepend(ir.Del('odd', WHERE))
+    assert 'odd' not in kernel_shortcuts._dominating(blocks, analysis)
+
+
+def arrays_in_a_loop(n):
+    total, held = 0.0, np.ones(n)
+    if n == 1:
+        return total
+    for i in range(n):
+        part = np.arange(i) * 0.5
+        if i % 3:
+            for each in (held, part):
+                for k in range(each.size):
+                    total += each[k]
+            continue
+        total += part.size
+    return total
+
+
+def test_arrays_that_a_loop_makes_are_freed_once():
+    compiled = allocating_kernel(arrays_in_a_loop)
+    compiled(1)  # from now on numba has what it counts with
+    _nrt_python.memsys_enable_stats()
+    try:
+        before = rtsys.get_allocation_stats()
+        assert compiled(50) == arrays_in_a_loop(50)
+        after = rtsys.get_allocation_stats()
+    finally:
+        _nrt_python.memsys_disable_stats()
+    assert after.alloc - before.alloc == after.free - before.free > 0
 
 
 @pytest.mark.parametrize('changed', [

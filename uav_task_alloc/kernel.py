@@ -20,6 +20,7 @@ import numba
 from numba import types
 from numba.core.registry import CPUDispatcher
 
+from uav_task_alloc.kernel_arguments import pass_tuples_whole
 from uav_task_alloc.kernel_cache import ON_DISK, install
 from uav_task_alloc.kernel_shortcuts import shortcuts
 
@@ -27,6 +28,7 @@ NJIT: Any = numba.njit  # its stubs do not know all options
 _Function = TypeVar('_Function', bound=Callable[..., Any])
 
 install()
+pass_tuples_whole()
 
 
 class _Kernel(CPUDispatcher):

@@ -22,7 +22,8 @@ from typing import Any, NamedTuple, TextIO
 
 from numba.core import caching, event
 
-_COMPILER_SOURCES = 'kernel.py', 'kernel_inner.py', 'kernel_shortcuts.py', 'model/zone.py'
+_COMPILER_SOURCES = ('kernel.py', 'kernel_arguments.py', 'kernel_inner.py', 'kernel_shortcuts.py',
+                     'model/zone.py')
 ROOMS = ('anticipation', 'geometry', 'separation', 'solver')
 
 

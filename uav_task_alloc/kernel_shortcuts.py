@@ -7,6 +7,7 @@ the same then, and take longer to compile.
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -168,6 +169,45 @@ def _faster_names(original: Any) -> Any:
     return register
 
 
+def _fewer_slots(original: Any) -> Any:
+    """Variables: values where they are assigned once, before all uses, not slots on the stack.
+
+    numba has slots for those of several blocks, such as the arguments. Each use of a tuple of
+    arrays would read all of it, some hundred values, before the code is optimised.
+    """
+    analysis: Any = import_module('numba.core.analysis')
+
+    def find(self: Any) -> None:
+        original(self)
+        # arrays whose references are counted may be deleted twice, which slots allow
+        if not (self.context.enable_nrt or self.func_ir.func_id.is_generator):
+            self._singly_assigned_vars |= _dominating(self.func_ir.blocks, analysis)
+    return find
+
+
+def _dominating(blocks: Any, analysis: Any) -> set[str]:
+    """Variables with one assignment, which each path to any of their uses passes before."""
+    ir: Any = import_module('numba.core.ir')
+    assigned = Counter(each.target.name for block in blocks.values()
+                       for each in block.find_insts(ir.Assign))
+    use_defs = analysis.compute_use_defs(blocks)
+    found = {name: offset for offset, names in use_defs.defmap.items() for name in names
+             if assigned[name] == 1}
+    for name in analysis.must_use_alloca(blocks):
+        found.pop(name, None)
+    dominators = analysis.compute_cfg_from_blocks(blocks).dominators()
+    for offset, block in blocks.items():
+        before = use_defs.usemap[offset]  # used before an assignment in this block
+        deleted = {each.value for each in block.find_insts(ir.Del)}
+        for name in before | deleted:
+            first = found.get(name, offset)
+            # blocks are compiled in this order
+            earlier = first < offset and first in dominators.get(offset, ())
+            if name in found and not earlier and (first != offset or name in before):
+                del found[name]
+    return set(found)
+
+
 def _inner_lowering(original: Any) -> Any:
     """Functions of numba that a kernel calls: optimised where they are linked, as kernels are."""
     from uav_task_alloc.kernel_inner import begin_inner_library, replaces_known_methods
@@ -193,6 +233,7 @@ SHORTCUTS = (
     Shortcut('numba.core.postproc', 'PostProcessor.run', ('emit_dels', 'extend_lifetimes'),
              _shorter_post_processing),
     Shortcut('llvmlite.ir._utils', 'NameScope.register', ('name', 'deduplicate'), _faster_names),
+    Shortcut('numba.core.lowering', 'Lower._find_singly_assigned_variable', (), _fewer_slots),
     Shortcut('numba.core.typed_passes', 'NativeLowering.run_pass', ('state',), _inner_lowering))
 
 
