@@ -176,6 +176,8 @@ def _fewer_slots(original: Any) -> Any:
     arrays would read all of it, some hundred values, before the code is optimised.
     """
     analysis: Any = import_module('numba.core.analysis')
+    for name in ('compute_use_defs', 'must_use_alloca', 'compute_cfg_from_blocks'):
+        getattr(analysis, name)  # of another version
 
     def find(self: Any) -> None:
         original(self)
