@@ -138,7 +138,9 @@ def stay_time(service_time: float, actions: Collection[Action], at_point: bool) 
     Returns:
         [s].
     """
-    if not actions or not at_point:
+    if not actions:
+        return service_time
+    if not at_point:
         return service_time + actions_time(actions)
     holds = 1 + any(each.name in LASTING for each in actions)
     return holds * max(service_time, SETTLE) + actions_time(actions)

@@ -117,7 +117,7 @@ class Task:
     @property
     def path_length(self) -> float:
         """Length of the way that is flown as the service [m]; 0 of a point."""
-        return polyline_length(self.path)
+        return polyline_length(self.path) if self.path else 0.0
 
     @property
     def turned(self) -> Task:
