@@ -282,3 +282,10 @@ def test_what_crosses_a_climb_leaves_the_leg_after_it_to_be_changed():
     after = resolve((east, north, through), RULE)
     assert [each.flights for each in after.left] == [(0, 2)]
     assert max(point[2] for point in after.flights[0].legs[0].points) == 55.5
+
+
+@pytest.mark.parametrize('first', [True, False])
+def test_one_that_stays_in_the_air_without_a_leg_is_flown_around(first):
+    pair = (flight('a', (0, 0, 30), (FAR, 0, 30)), Flight('b', (), (200, 0, 30), 10.0, 2.5, 1.5))
+    result = checked(*(pair if first else pair[::-1]))
+    assert [each.resolution for each in result.conflicts] == ['height']

@@ -34,6 +34,7 @@ _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
 _MOVES, _CLIMBS = 2.0, 0.5  # [m/s] more than that: it does not hover; it does not fly level
 _TOWARDS = math.cos(math.radians(15.0))  # of the course and the direction of home
+_ASK_AGAIN = 10.0  # [s] between plans for UAVs that hold for each other
 _MOST_SENT = 50  # lists of a UAV that are kept
 _CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
 _FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
@@ -50,7 +51,7 @@ class SeparationWatch:
 
     def __init__(self, world: World) -> None:
         self._world, self.monitor = world, SeparationMonitor()
-        self._stepped = -math.inf  # [s] published clock
+        self._stepped = self._asked = -math.inf  # [s] published clock; of the last plan asked for
         self._silent: dict[str, float] = {}  # by id: published clock [s] when it was found silent
         # by id and revision: lists in force, and before, that may be on board
         self._sent: dict[str, dict[int, UavList]] = {}
@@ -80,6 +81,11 @@ class SeparationWatch:
                                                                   AlertAction.UNRESOLVED))
         for one, other in step.unresolved:
             self._world.request_replan(f'{one} and {other} lose separation', now)
+        self._world.stuck = self.monitor.stuck
+        if self._world.stuck and not 0.0 <= stamp - self._asked < _ASK_AGAIN:
+            self._asked = stamp
+            self._world.request_replan(f'{", ".join(sorted(self._world.stuck))} hold for each '
+                                       'other', now)
         return step
 
     def texts(self) -> dict[str, str]:

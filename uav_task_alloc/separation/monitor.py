@@ -128,6 +128,12 @@ class SeparationMonitor:
         return {uav_id: hold.reason for uav_id, hold in self._holds.items()}
 
     @property
+    def stuck(self) -> frozenset[str]:
+        """Ids of UAVs that hold for one that holds for them: only other lists let them go on."""
+        return frozenset(name for name, hold in self._holds.items() if any(
+            name in self._holds[other].waits_for for other in hold.waits_for & {*self._holds}))
+
+    @property
     def alerts(self) -> Mapping[UavPair, SeparationAlert]:
         """What is predicted now, by pair."""
         return {pair: each.alert for pair, each in self._alerts.items()}

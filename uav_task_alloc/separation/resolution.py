@@ -146,8 +146,7 @@ class _Planner:
                 if n == 0:
                     self._accepted.add(rows[:_climbed_rows(flight, rows)], (k, n))
                 return
-            if whole or flight.legs:
-                self._accepted.add(rows, (k, n))
+            self._accepted.add(rows, (k, n))  # also where one without legs stays
 
     def plan(self, k: int) -> None:
         """Change the legs of a flight that are in conflict, and accept it."""

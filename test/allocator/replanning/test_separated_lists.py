@@ -234,3 +234,33 @@ def test_the_leg_after_a_take_off_that_has_begun_may_get_another_height():
     flight = planned_flights(world, world.lists_in_force(), driver.now)['a']
     assert flight.legs[0].movable
     assert flight.legs[0].points == ((0.0, 0.0, 20.0), (0.0, 300.0, 50.0))
+
+
+def test_of_two_that_hold_for_each_other_one_gets_another_height_from_where_it_stands():
+    driver = AllocatorDriver(**ON)
+    more = {'mode': 'ON_MISSION', 'authority': 'HELD', **SPEEDS}
+
+    def report(a, b, speed):
+        driver.uav('a', a, 0.0, 50.0, velocity=(speed, 0.0, 0.0), **more)
+        driver.uav('b', b, 0.0, 50.0, velocity=(-speed, 0.0, 0.0), **more)
+
+    report(0.0, 2000.0, 10.0)
+    driver.add(Task('ta', (1500.0, 0.0, 50.0), allowed_uavs={'a'}),
+               Task('tb', (0.0, 0.0, 50.0), allowed_uavs={'b'}))
+    driver.settle(report=False)
+    lists = driver.world.lists.lists
+    for each in 'ab':
+        lists[each] = replace(lists[each], stops=tuple(
+            replace(stop, leg=Leg((), 1500.0)) for stop in lists[each].stops))
+    report(700.0, 780.0, 10.0)
+    driver.core.separate(driver.now, driver.now)
+    report(720.0, 760.0, 0.0)
+    more['mode'] = 'HOLD'
+    for _ in range(4):
+        driver.now += 5.0
+        report(720.0, 760.0, 0.0)
+        driver.core.separate(driver.now, driver.now)
+        driver.settle(0.5, report=False)
+    vias = [stop.leg.via for each in 'ab' for stop in lists[each].stops]
+    assert sorted(map(len, vias)) == [0, 2], vias
+    assert [*driver.core.separation.monitor.holding] == ['b']  # until a has passed above it

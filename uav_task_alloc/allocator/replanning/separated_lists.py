@@ -29,6 +29,7 @@ _CHANGES = 20_000  # tried for each second of `solve_budget`, where the next pla
 _AHEAD = 2.0
 _DEAREST = 15.0  # [s] of flight that a return may cost; the monitor holds for about that time
 _LEAST = 1.0  # [s] of a wait; a shorter one is no change
+_RESTS = 1.0  # [m/s] below that a UAV stands
 _AT_PLACE = 2.0  # [m] it is at its waiting place
 _LEAST_ERROR = 0.05  # share by which times may be off, however exact they were
 
@@ -107,16 +108,35 @@ def planned_flights(world: World, lists: Mapping[str, UavList],
     """
     flights, rule = {}, separation_of(world.params)
     until = _AHEAD * rule.horizon if world.params.background_budget > 0.0 else math.inf
+    mover = _mover(world, lists)
     for uav_id, each in lists.items():
         flight = world.flights.of(uav_id, stamp)
-        if flight is not None and not world.flights.is_forgotten(uav_id, stamp):
-            flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp, rule, until)
+        if flight is None or world.flights.is_forgotten(uav_id, stamp):
+            continue
+        if mover and uav_id != mover and uav_id in world.stuck:  # it stands until that has passed
+            flights[uav_id] = _empty(uav_id, flight, rule)
+            continue
+        flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp, rule, until,
+                                  uav_id == mover)
     return flights
 
 
+def _mover(world: World, lists: Mapping[str, UavList]) -> str:
+    """The first of the UAVs that hold for each other whose leg can change; '': there is none."""
+    for uav_id in sorted(world.stuck & lists.keys()):
+        record, stops = world.uav_record(uav_id), lists[uav_id].stops
+        if record and stops and not stops[0].task.path and (
+                math.hypot(*(record.report.velocity or (0.0,))) < _RESTS):
+            return uav_id
+    return ''
+
+
 def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
-            rule: Separation, until: float) -> Flight:
-    """What a UAV flies by its list, up to a leg that ends after `until` [s] from now."""
+            rule: Separation, until: float, stands: bool) -> Flight:
+    """What a UAV flies by its list, up to a leg that ends after `until` [s] from now.
+
+    Where it stands, the leg under way can change its height.
+    """
     own, legs, place = _empty(each.uav, flight, rule), list[FlightLeg](), flight.position
     clock = 0.0  # [s] from now
     if each.stops and flight.waiting == each.stops[0].task.id:  # it has not set out
@@ -135,7 +155,7 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
                         0.0 if along else max(0.0, stop.task.stay - served),
                         stop.task.earliest - stamp, stop.task.latest - stamp,
                         stop.task.release - stamp,
-                        takes_off=takes_off, movable=not under_way,
+                        takes_off=takes_off, movable=stands or not under_way,
                         top=flight.takeoff_top if climbs else -math.inf)
         if begins > 0.0:  # it keeps the wait that it had, or less
             leg = replace(leg, hold_until=begins - own.leg_seconds(leg))

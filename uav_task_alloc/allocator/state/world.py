@@ -96,6 +96,7 @@ class World:
         self._resend = {each.uav for each in saved.lists}  # UAVs whose lists are resent
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
+        self.stuck: frozenset[str] = frozenset()  # UAVs that hold for one that holds for them
         self.tasks = TaskRegistry(saved.tasks)
         self.orders, self.proposal = Orders(saved.orders), saved.proposal
         self.fleet = Fleet(saved.switched_off, {
