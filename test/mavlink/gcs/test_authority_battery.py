@@ -83,6 +83,16 @@ def powered_off(bench):
 MOMENTS = {
     'turns home': (lambda bench: bench.started() == ['A'] and not bench.run(limit=4.0),
                    lambda bench: 'item_reached' in names(bench) and not bench.run(limit=3.0)),
+    'comes down until power is lost': (
+        lambda bench: bench.completed() == ['A'] and not bench.run(limit=5.0)
+        and 0.5 < bench.vehicles[1].flight.body.position[2] < 20.0, powered_off),
+    'comes down until it boots': (
+        lambda bench: bench.completed() == ['A'] and not bench.run(limit=5.0)
+        and 0.5 < bench.vehicles[1].flight.body.position[2] < 8.0,
+        lambda bench: 'battery_changed' in names(bench)),
+    'has just touched down': (
+        lambda bench: bench.completed() == ['A'] and not bench.run(limit=5.0) and bench.run(
+            lambda: bench.vehicles[1].flight.landed, 60.0), powered_off),
     'lands': (lambda bench: bench.completed() == ['A'] and not bench.run(limit=5.0)
               and bench.vehicles[1].flight.body.position[2] < 12.0,
               lambda bench: 'disarmed' in names(bench)),
@@ -116,3 +126,42 @@ def test_it_flies_its_next_list_after_a_kill_of_the_bridge_while_it(kind, moment
     assert bench.authority() is AuthorityState.HELD
     assert bench.completed() in ([], ['A'])  # again after 'turns home'
     assert bench.flown() == [(0, 100, 50)]
+
+
+@BOTH
+def test_it_stays_with_a_pilot_who_has_landed_it_elsewhere_after_a_kill_of_the_bridge(kind):
+    bench = AuthorityBench(kind, relaunch='automatic', configs={1: {
+        'range': 3000.0, 'boot_delay': 6.0, 'arming_delay': 10.0}}).discover()
+    flight = bench.vehicles[1].flight
+    bench.assign(task_list('A', returns=True))
+    assert bench.run(lambda: bench.completed() == ['A'], 100.0)
+    assert bench.run(lambda: flight.body.position[2] < 20.0, 100.0)
+    bench.kill()
+    for mode, stick in ((MODES[kind].stick, (5.0, 0.0, 0.0)), (MODES[kind].land, None)):
+        bench.vehicles[1].rc_mode(mode)
+        bench.vehicles[1].rc_stick(stick)
+        bench.run(limit=4.0)
+    assert bench.run(lambda: 'disarmed' in names(bench), 60.0)
+    flight.body.battery = 1.0
+    bench.vehicles[1].reboot(bench.now)
+    bench.start()
+    assert bench.run(lambda: bench.ground_station.sessions, 100.0)
+    bench.assign(task_list('AB', 2, returns=True))
+    bench.run(limit=60.0)
+    assert bench.authority() is AuthorityState.LOST
+    assert not flight.armed
+
+
+def test_it_stays_with_a_pilot_who_has_landed_it_at_home_after_a_kill_of_the_bridge():
+    bench = AuthorityBench('ardupilot', relaunch='automatic', configs={1: {
+        'turnaround': 30.0, 'range': 3000.0}}).discover()
+    bench.assign(task_list('A', returns=True))
+    assert bench.run(lambda: bench.completed() == ['A'], 100.0)
+    assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] < 20.0, 100.0)
+    bench.kill()
+    bench.vehicles[1].rc_mode(MODES['ardupilot'].land)
+    assert bench.run(lambda: 'disarmed' in names(bench), 60.0)
+    bench.start()  # it shows the pilot's mode
+    assert bench.run(lambda: 'battery_changed' in names(bench), 100.0)
+    bench.run(limit=60.0)
+    assert bench.authority() is AuthorityState.LOST

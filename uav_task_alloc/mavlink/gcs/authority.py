@@ -229,7 +229,8 @@ class AuthorityRecord:
     uploading: tuple[int, ...] = ()  # checksum of a mission being uploaded, index of its start
     # vehicle time [s], position [m] and velocity [m/s], both ENU, of one to three recent positions
     seen: tuple[float, ...] = ()
-    landed_battery: float | None = None  # 0..1, at its own landing, while it may start again
+    # 0..1, at its own landing or on its way down over its home, while it may start again
+    landed_battery: float | None = None
     pieces: tuple[PieceMark, ...] = ()  # that are partly flown
     ahead: tuple[TaskMark, ...] = ()  # the next tasks on board, with the one being flown; at 0 s
 

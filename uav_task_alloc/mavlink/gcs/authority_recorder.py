@@ -13,6 +13,7 @@ from uav_task_alloc.model import Point
 _MARKS, _MARK_LIFETIME = 50, 600.0  # tasks, [s]
 _LAST_TIME = -7  # index of the time of the newest position
 _POSITION_PERIOD = 1.0  # [s] between two positions that are saved
+LANDING_RADIUS = 5.0  # [m] from home at most, of a landing there
 
 
 class AuthorityRecorder:
@@ -63,6 +64,18 @@ class AuthorityRecorder:
             self._seen_at = positions[_LAST_TIME] if positions else -math.inf
         return self._seen
 
+    def _landed_battery(self) -> float | None:
+        """The battery at its own landing, also while it returns and is over its home."""
+        state, telemetry = self._state, self._state.telemetry
+        battery, home = state.landed_battery, telemetry.home
+        if (math.isnan(battery) and home is not None and state.armed and state.authority.held
+                and not state.authority.until_landing
+                and ((state.descending and state.is_return(state.mode))
+                     or (self._evidence.returning() and telemetry.in_mission))
+                and math.dist(telemetry.position[:2], home[:2]) <= LANDING_RADIUS):
+            battery = telemetry.battery
+        return None if math.isnan(battery) else round(battery, 3)
+
     def save_if_changed(self) -> None:
         """Save the record where it differs from the one saved last."""
         state, authority, sent = self._state, self._state.authority, self._state.sent
@@ -80,7 +93,7 @@ class AuthorityRecorder:
             state.replacing_since, sent.climb, tuple(self.marks.values()),
             *position, passed, evidence.uploading(),
             self._last_position(passed),
-            None if math.isnan(state.landed_battery) else round(state.landed_battery, 3),
+            self._landed_battery(),
             evidence.pieces(), evidence.ahead(position[1]))
         if fields == self._fields:  # as after most messages
             return

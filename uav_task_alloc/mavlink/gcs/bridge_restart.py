@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityRecord, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_recorder import LANDING_RADIUS
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass
 from uav_task_alloc.mavlink.gcs.hand_over import REST_SPEED
@@ -15,6 +16,8 @@ from uav_task_alloc.mavlink.gcs.policy import Policy
 _REPLACEMENT_KEPT = 60.0  # [s] after which a replacement of the previous run is not continued
 _BRAKING_TIME = 10.0  # [s] from the HOLD command until the vehicle is at rest
 _CLIMB_ERROR = 0.1  # of the height of a take-off, by which its end differs at most
+# vehicle time, and east and north, of the newest position in `AuthorityRecord.seen`
+_TIME, _PLACE = -7, slice(-6, -4)
 _DRIFT = 5.0  # [m] from home at most where a take-off ends
 
 
@@ -37,6 +40,7 @@ class BridgeRestart:
         self._mission: int | None = None  # checksum of one that may have ended while it was down
         self._held_in: int | None = None  # custom_mode, of a HOLD that may be its end
         self._landed_in: int | None = None  # custom_mode, of a landing of its own meanwhile
+        self._landing: AuthorityRecord | None = None  # while it came down to land
         if record is None:
             state.authority.undecided = True
 
@@ -73,13 +77,17 @@ class BridgeRestart:
         self._record = None
         self._apply_result(record, agrees, now)
         self._await_battery_change(record)
-        if not agrees:
+        if not agrees and self._landing is None:
             self._may_have_ended(record)
 
     def _await_battery_change(self, record: AuthorityRecord) -> None:
         """Continue to wait for a full battery after a landing of its own."""
         state = self._state
-        if record.landed_battery is not None and not state.armed:
+        if record.landed_battery is None or state.armed:
+            return
+        if record.armed:
+            self._landing = record if record.seen else None
+        else:
             state.landed_battery = record.landed_battery
             state.rebooted_on_ground = not state.authority.held  # else a reboot is still to come
             state.authority.awaits_battery = state.rebooted_on_ground
@@ -95,9 +103,14 @@ class BridgeRestart:
             if ModeClass.MISSION in modes and (holds or state.is_return(state.mode)):
                 self._mission = record.mission
                 self._held_in = state.mode if holds else None
-        elif state.mode == record.mode or (  # PX4 changes to Hold when it has landed
-                state.is_return(record.mode) and state.class_of(state.mode) is ModeClass.HOLD):
+        elif self._keeps_mode(record):
             self._landed_in = state.mode
+
+    def _keeps_mode(self, record: AuthorityRecord) -> bool:
+        """Whether it is on the ground in the mode in which it came down."""
+        state = self._state
+        return state.mode == record.mode or (  # PX4 changes to Hold when it has landed
+            state.is_return(record.mode) and state.class_of(state.mode) is ModeClass.HOLD)
 
     def _agrees(self, record: AuthorityRecord) -> bool:
         state = self._state
@@ -156,10 +169,25 @@ class BridgeRestart:
             self._mission = None
             what = 'returns' if state.is_return(state.mode) else 'holds'
             state.apply(AuthorityEvent.RESTART_OURS, now, f'{what} at the end of our mission')
+        if self._landing is not None:
+            self._find_landing()
         if self._landed_in is not None and state.telemetry.battery >= 0.0:
             if state.mode == self._landed_in and not state.armed and state.telemetry.grounded:
                 state.landed_battery = state.telemetry.battery
             self._landed_in = None
+
+    def _find_landing(self) -> None:
+        """Await a full battery where it stands at the place to which it was coming down."""
+        state, record, telemetry = self._state, self._landing, self._state.telemetry
+        if record is None or state.armed or state.authority.killed:
+            self._landing = None
+        elif telemetry.has_position and telemetry.grounded:
+            self._landing = None
+            rebooted = 1e-3 * telemetry.boot_ms < record.seen[_TIME]
+            if (rebooted or self._keeps_mode(record)) and (
+                    math.dist(telemetry.position[:2], record.seen[_PLACE]) <= LANDING_RADIUS):
+                state.landed_battery = record.landed_battery or 0.0
+                state.rebooted_on_ground = state.authority.awaits_battery = True
 
     def _mission_has_ended(self, now: float) -> bool:
         """Whether it has returned, or held, since the end of the mission in its record (PX4)."""
