@@ -62,6 +62,7 @@ class Judge:
         self._mode = self._shown = world.vehicle.flight.custom_mode
         self._mode_at = -math.inf  # [s]
         self._armed = False  # ever
+        self._boot_over = False  # a frame was delivered that shows the end of its boot
         self._commanded: dict[int, float] = {}  # modes commanded by the bridge, at [s]
         self._commanded_arm, self._taken_by_arm = -math.inf, False
         self._armed_at, self._shown_armed = -math.inf, False  # [s]; by a delivered frame since
@@ -85,7 +86,7 @@ class Judge:
 
     def rebooted(self) -> None:
         """Note a reboot: on the ground; an aircraft never armed is taken by no one."""
-        self.failing = False
+        self.failing = self._boot_over = False
         if not self._armed and (self.known_at is None or self.world.now - self.known_at < DOUBT):
             self.taken_at = self.known_at = None
 
@@ -108,6 +109,8 @@ class Judge:
         for sent, message in self.world.delivered:
             self._evidence.delivered(sent, message)
             self._shown_armed |= sent >= self._armed_at and shows_armed(message)
+            self._boot_over |= message.get_type() == 'HEARTBEAT' and (
+                message.system_status >= d.MAV_STATE_STANDBY)
         if self.world.now - self._set_at < PASSED:
             self._crossed.update(name for name, place in self.places.items() if math.dist(
                 place, self.world.vehicle.flight.body.position) < NEAR)
@@ -204,7 +207,8 @@ class Judge:
                 self.handed_back()  # the bridge has to wait before it believes that
         elif (new is not ModeClass.HOLD or was is ModeClass.MISSION) and (
                 event.t - self._commanded.get(event.mode, -math.inf) > SAME) and (
-                event.cause != 'failsafe' or airborne or self.world.vehicle.flight.armed):
+                event.cause != 'failsafe' or airborne or self.world.vehicle.flight.armed) and (
+                self._armed or self._boot_over):  # else as if it had been set during its boot
             self._taken_by_mode = event.t if self.taken_at is None else self._taken_by_mode
             self._take(event.t)
 

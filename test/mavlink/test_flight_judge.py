@@ -51,10 +51,10 @@ def current(seq, state=d.MISSION_STATE_ACTIVE):
     return d.MAVLink_mission_current_message(seq, 3, state, 1)
 
 
-def heartbeat(armed):
+def heartbeat(armed, status=d.MAV_STATE_STANDBY):
     return d.MAVLink_heartbeat_message(
         d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, d.MAV_MODE_FLAG_SAFETY_ARMED * armed, 0,
-        d.MAV_STATE_STANDBY, 3)
+        status, 3)
 
 
 def position():
@@ -226,6 +226,17 @@ def test_a_mode_that_ends_before_a_frame_can_show_it_is_no_news(seconds, overrid
         (1.5, BY_LAND[:1], None, None) if seconds else (1.5, [], None, None),
         (1.5 + seconds, [*([] if seconds else BY_LAND[:1]), BY_LAND[2]], None, None),
         (2.0, [], heartbeat(True), None), (2.1, [], None, arm_command())])
+    assert bool(counts['overridden']) is overridden
+
+
+@pytest.mark.parametrize(('status', 'overridden'), [
+    (d.MAV_STATE_BOOT, False), (d.MAV_STATE_STANDBY, True)])
+def test_a_mode_set_before_a_frame_showed_the_end_of_the_boot_may_be_of_the_boot(
+        status, overridden):
+    counts = judged([
+        (1.0, [], heartbeat(False, status), None),
+        (15.0, [('mode', 'pilot', px4_mode(2))], None, None),
+        (16.0, [], heartbeat(False), None), (17.0, [], None, arm_command())])
     assert bool(counts['overridden']) is overridden
 
 

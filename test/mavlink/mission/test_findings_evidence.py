@@ -148,7 +148,7 @@ def test_a_task_passed_without_positions_counts_where_the_vehicle_is_seen_again(
     flight.fly_to(250.0)
     assert list(flight.table.completed) == []
     flight.lost = False
-    flight.stay(1.0)
+    flight.stay(1.0, SPEED)
     assert list(flight.table.completed) == ['A']
 
 

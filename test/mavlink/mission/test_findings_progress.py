@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Findings 4-8, 16, 17: what no one flew is not COMPLETED, and is flown later."""
+import math
+
 import pytest
 from findings_bench import (
     BOTH,
@@ -18,6 +20,7 @@ from mission_bench import OURS, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
+from uav_task_alloc.mavlink.mission.flown_path import FlownPath, PositionSample
 from uav_task_alloc.mavlink.mission.upload import UploadState
 
 C = (200.0, 100.0, 50.0)
@@ -303,3 +306,17 @@ def test_a_late_current_after_a_replacement_completes_nothing_in_flight(kind):
     late.append(bench.now + 3.0)
     bench.assign(task_list('XYC', 2))
     flown_once_each(bench, 'ABXYC')
+
+
+@pytest.mark.parametrize(('x', 'speed', 'flown'), [
+    (88.0, -0.1, False),  # set to the next item before it was there, it turns around
+    (88.0, 3.0, False),
+    (88.0, -3.0, True),
+    (95.0, -0.1, True),  # it sets out
+    (88.0, math.nan, True)])
+def test_a_vehicle_at_rest_in_the_middle_of_a_leg_has_not_come_from_its_start(x, speed, flown):
+    path = FlownPath()
+    path.add(PositionSample(0.0, (-50.0, 0.0, 50.0), (15.0, 0.0, 0.0)))
+    path.add(PositionSample(18.0, (x, 0.0, 50.0), (speed, 0.0, 0.0)))
+    assert path.could_have_flown(
+        [(100.0, 0.0, 50.0)], (0.0, 0.0, 50.0), 0.0, 0.0) is flown

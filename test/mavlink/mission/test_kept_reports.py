@@ -71,6 +71,27 @@ def test_a_place_passed_before_a_mission_was_sent_is_not_flown_by_a_repetition(e
     assert list(flight.table.completed) == ['A']
 
 
+@pytest.mark.parametrize(('current', 'completed'), [(0, ['A']), (1, ['A', 'C'])])
+def test_a_repetition_at_the_first_place_of_a_new_mission_counts_once_that_has_moved_on(
+        current, completed):
+    flight = Flight()
+    flight.begin(A=50.0, X=900.0)
+    flight.fly_to(50.0)
+    flight.reached(0)
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    for _ in range(8):
+        flight.stay(1.0, 10.0)
+        flight.reached(0)
+    reports, new = upload_during(flight, C=138.0, D=-900.0)
+    reports.note_sent(flight.frame())
+    flight.stay(1.0, 10.0)
+    reports.add_reached(0, flight.now, flight.frame())
+    flight.stay(0.2, 10.0)
+    reports.add_current(current, flight.now, flight.frame(), True, 7)
+    reports.step(new, flight.now)
+    assert list(flight.table.completed) == completed
+
+
 @PX4
 @pytest.mark.parametrize('lost', [(), ('MISSION_ITEM_REACHED',)])
 @pytest.mark.parametrize('then', ['', 'newer list', 'pilot'])

@@ -28,6 +28,9 @@ _FEW, _USUAL_SPEED = 100, 15.0  # samples; [m/s] assumed where there are fewer
 _ACCELERATION = 6.0  # [m/s2] that no vehicle exceeds for seconds (PX4: MPC_ACC_HOR_MAX 5)
 _CORRIDOR = 8.0  # [m] from a leg at which a vehicle flies it
 _INSIDE = 2.5  # [m] from a leg on the inner side of the turn before it, where it cuts the corner
+_LEG_END = 10.0  # [m] from the ends of a leg where a vehicle may be at any speed
+_LEAST_ACCELERATION = 1.0  # [m/s2] with which a vehicle sets out on a leg, and ends it
+_LEAST_SHARE = 0.1  # of its highest speed of late, with which it flies the rest of a leg
 _HOLD_SLACK = 0.1  # [s] by which a sampled hold may be shorter than the real one
 _AHEAD = 1.0  # [s] after the newest sample, in which a vehicle keeps its velocity
 
@@ -171,13 +174,15 @@ class FlownPath:
             home: where it returns to from the last point, at a height that is not known; ENU [m].
 
         Returns:
-            True where a gap is long enough and the sample after it lies on the following leg.
+            True where a gap is long enough and the sample after it is of a vehicle that flies the
+            following leg.
         """
         fastest = self.fastest
         for a, b in pairwise(self._since(since)):
             if b.t - a.t > GAP and polyline_length((a.position, *chain, b.position)) <= (
                     _longest_way(a, b, 1.1 * fastest, b.t - a.t - 0.8 * holds)) + 10.0 and (
-                    anywhere or _on_leg(b.position, (a.position, *chain), then, home)):
+                    anywhere or (_on_leg(b.position, (a.position, *chain), then, home)
+                    and (home is not None or _moves_along(b, chain[-1], then, fastest)))):
                 return True
         return False
 
@@ -249,6 +254,23 @@ def _on_leg(point: Point, flown: Sequence[Point], then: Point | None,
     aside, inwards = _beside(point, start, then), _beside(flown[-2], start, then)
     inner = sum(p * q for p, q in zip(aside, inwards, strict=True))
     return inner <= _INSIDE * math.hypot(*inwards)
+
+
+def _moves_along(sample: PositionSample, start: Point, then: Point | None,
+                 fastest: float) -> bool:
+    """Whether it is as fast along a leg as a vehicle that flies it; True where not known.
+
+    One that turns around in the middle of a leg has not come from its start.
+    """
+    length = 0.0 if then is None else math.dist(start, then)
+    if then is None or length == 0.0 or math.isnan(math.hypot(*sample.velocity)):
+        return True
+    along = [(q - p) / length for p, q in zip(start, then, strict=True)]
+    flown = math.fsum((q - p) * k for p, q, k in zip(start, sample.position, along, strict=True))
+    speed = math.fsum(v * k for v, k in zip(sample.velocity, along, strict=True))
+    free = min(flown, length - flown) - _LEG_END
+    return free <= 0.0 or speed >= min(
+        math.sqrt(2.0 * _LEAST_ACCELERATION * free), _LEAST_SHARE * fastest)
 
 
 def _beside(point: Point, start: Point, end: Point) -> Point:

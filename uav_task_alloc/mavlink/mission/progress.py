@@ -380,9 +380,9 @@ class ProgressTable:
             item, max(self._epoch.since, since), self.positions.vehicle_time(when))
 
     def was_exactly_at(self, item: Item, when: float, since: float = -math.inf) -> bool:
-        """Whether it was within the radius of an item; see `was_at_by`."""
-        return self.positions.was_at(
-            item, max(self._epoch.since, since), self.positions.vehicle_time(when), close=0.0)
+        """Whether it was within the radius of an item in mission mode; see `was_at_by`."""
+        until = min(self.positions.vehicle_time(when), self._moves.left_at)
+        return self.positions.was_at(item, max(self._epoch.since, since), until, close=0.0)
 
     def near_one(self, item: Item, other: Item | None, when: float) -> bool:
         """Whether it was near one item, but not another, before a message at `when` [s]."""

@@ -198,7 +198,7 @@ class ReportsDuringUpload:
         seq, frame, last, last_frame, kept_at = reached
         progress, first = self._progress, self._first_at(reached)
         if first < kept_at or progress.may_repeat_earlier(seq, last, last_frame):
-            return self._credit_repeated(reached, before, after, uploaded.start)
+            return self._credit_repeated(reached, before, after, uploaded)
         if before is not None and self._was_at(before, reached, len(progress.items), -math.inf):
             progress.note_reached(seq, first, proven=True, frame=frame)
         elif before is not None and after is not None and alike(before, after):
@@ -214,7 +214,7 @@ class ReportsDuringUpload:
         elif after is not None and progress.near_one(after, before, first):
             return first
         else:
-            return self._credit_repeated(reached, before, after, uploaded.start)
+            return self._credit_repeated(reached, before, after, uploaded)
         return None
 
     @property
@@ -237,10 +237,13 @@ class ReportsDuringUpload:
             item, self._first_at(reached), max(since, reported - item.params[0]))
 
     def _credit_repeated(self, reached: _Reached, before: Item | None, after: Item | None,
-                         start: int) -> float | None:
+                         uploaded: MissionDiff) -> float | None:
         """As `_credit_old`, where only a new one among repetitions of an older one counts."""
         progress, seq, last = self._progress, reached.seq, reached.last
-        if after is not None and seq == start and progress.was_exactly_at(
+        # a new one makes the next item current; the last item stays
+        passed = seq == len(uploaded.items) - 1 or any(
+            each.seq > seq and each.frame > reached.frame for each in self._currents)
+        if after is not None and seq == uploaded.start and passed and progress.was_exactly_at(
                 after, last, self._new_since):
             return last
         if before is not None and seq == progress.current and (
