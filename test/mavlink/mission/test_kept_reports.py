@@ -50,16 +50,22 @@ def test_a_repetition_that_began_before_an_upload_is_not_of_its_mission():
     assert list(flight.table.completed) == ['A', 'C']
 
 
-@pytest.mark.parametrize('early', [True, False])
-def test_a_place_passed_before_a_mission_was_sent_is_not_flown_by_a_repetition(early):
+def repeating_after_a(seconds):
+    """A flight that has reached A, and repeats that while it flies on."""
     flight = Flight()
     flight.begin(A=50.0, X=900.0)
     flight.fly_to(50.0)
     flight.reached(0)
     flight.table.note_current(1, flight.now, True, flight.frame())
-    for _ in range(9):
+    for _ in range(seconds):
         flight.stay(1.0, 10.0)
         flight.reached(0)
+    return flight
+
+
+@pytest.mark.parametrize('early', [True, False])
+def test_a_place_passed_before_a_mission_was_sent_is_not_flown_by_a_repetition(early):
+    flight = repeating_after_a(9)
     reports, new = upload_during(flight, C=100.0, D=-900.0)
     reports.note_sent(flight.frame())
     flight.stay(1.0, 10.0)
@@ -74,14 +80,7 @@ def test_a_place_passed_before_a_mission_was_sent_is_not_flown_by_a_repetition(e
 @pytest.mark.parametrize(('current', 'completed'), [(0, ['A']), (1, ['A', 'C'])])
 def test_a_repetition_at_the_first_place_of_a_new_mission_counts_once_that_has_moved_on(
         current, completed):
-    flight = Flight()
-    flight.begin(A=50.0, X=900.0)
-    flight.fly_to(50.0)
-    flight.reached(0)
-    flight.table.note_current(1, flight.now, True, flight.frame())
-    for _ in range(8):
-        flight.stay(1.0, 10.0)
-        flight.reached(0)
+    flight = repeating_after_a(8)
     reports, new = upload_during(flight, C=138.0, D=-900.0)
     reports.note_sent(flight.frame())
     flight.stay(1.0, 10.0)
