@@ -110,7 +110,8 @@ MOMENTS = {
 @pytest.mark.parametrize('moment', MOMENTS)
 def test_it_flies_its_next_list_after_a_kill_of_the_bridge_while_it(kind, moment):
     bench = AuthorityBench(kind, relaunch='automatic', configs={1: {
-        'turnaround': 30.0, 'range': 3000.0, 'boot_delay': 6.0, 'arming_delay': 10.0}}).discover()
+        'turnaround': 30.0, 'range': 3000.0, 'boot_delay': 6.0, 'arming_delay': 10.0,
+        'settling_time': 8.0 if kind == 'px4' else None}}).discover()
     killed, started = MOMENTS[moment]
     bench.assign(task_list('A', returns=True))
     assert bench.run(lambda: killed(bench), 300.0), names(bench)

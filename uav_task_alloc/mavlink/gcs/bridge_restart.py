@@ -182,10 +182,11 @@ class BridgeRestart:
         if record is None or state.armed or state.authority.killed:
             self._landing = None
         elif telemetry.has_position and telemetry.grounded:
-            self._landing = None
             rebooted = 1e-3 * telemetry.boot_ms < record.seen[_TIME]
-            if (rebooted or self._keeps_mode(record)) and (
-                    math.dist(telemetry.position[:2], record.seen[_PLACE]) <= LANDING_RADIUS):
+            if not rebooted and not self._keeps_mode(record):
+                self._landing = None
+            elif math.dist(telemetry.position[:2], record.seen[_PLACE]) <= LANDING_RADIUS:
+                self._landing = None  # else its first position estimates may still be settling
                 state.landed_battery = record.landed_battery or 0.0
                 state.rebooted_on_ground = state.authority.awaits_battery = True
 
