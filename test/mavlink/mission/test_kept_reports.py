@@ -91,6 +91,19 @@ def test_a_repetition_at_the_first_place_of_a_new_mission_counts_once_that_has_m
     assert list(flight.table.completed) == completed
 
 
+@pytest.mark.parametrize(('place', 'completed'), [(99.0, ['A']), (90.0, [])])
+def test_a_reached_just_before_a_reboot_counts_where_the_vehicle_was_at_its_item(place, completed):
+    flight = Flight()
+    flight.begin(X=900.0, Y=950.0)
+    flight.stay(1.0)
+    flight.begin(A=100.0, B=500.0)
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(place)
+    flight.reached(0)  # no report of the next current item has come
+    flight.table.invalidate()
+    assert list(flight.table.completed) == completed
+
+
 @PX4
 @pytest.mark.parametrize('lost', [(), ('MISSION_ITEM_REACHED',)])
 @pytest.mark.parametrize('then', ['', 'newer list', 'pilot'])

@@ -222,7 +222,7 @@ class ProgressTable:
         """End the epoch: the mission on board is unknown."""
         self.end_before_restart.note_restart(self._stepped_at)
         self._moves.invalidate(self._stepped_at)
-        self._reached.last = None
+        self._reached.end()
         self._epochs.clear()
         self._epochs.series.clear()
         self._epoch.invalidate()

@@ -41,6 +41,16 @@ class ReachedItems:
         self.seqs.clear()
         self.last = None
 
+    def end(self) -> None:
+        """End the epoch: what a REACHED names is complete where the positions have shown it."""
+        epoch, series = self._epoch, self._epochs.series
+        for seq, (_, reached) in self._epochs.unproven.items():
+            if 0 <= seq < len(epoch.items) and series.first_sent(reached) >= epoch.taken and (
+                    not series.repeats_credited(reached)) and (
+                    self._positions.was_at(epoch.items[seq], epoch.since, close=0.0)):
+                self._tasks.credit(epoch.items[seq])
+        self.last = None
+
     def note(self, seq: int, now: float, proven: bool, frame: int | None) -> None:
         """Take one; see `ProgressTable.note_reached`."""
         epoch, epochs, positions = self._epoch, self._epochs, self._positions
