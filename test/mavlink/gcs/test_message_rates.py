@@ -66,3 +66,17 @@ def test_positions_that_stop_are_requested_again(kind):
         m.get_type() == 'GLOBAL_POSITION_INT') else None)
     bench.run(limit=5.0)
     assert len(requested_rates(bench, 'GLOBAL_POSITION_INT')) > before
+
+
+@BOTH
+def test_positions_that_never_came_are_requested_until_they_come(kind):
+    bench = FlightBench(kind, takeoff=False)
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        m.get_type() == 'GLOBAL_POSITION_INT') else None)
+    bench.discover()
+    bench.run(limit=60.0)
+    asked = len(requested_rates(bench, 'GLOBAL_POSITION_INT'))
+    assert MAX_REQUESTS < asked <= MAX_REQUESTS + 6  # slowly in the end
+    bench.line.tampers.clear()
+    bench.run(limit=30.0)
+    assert len(requested_rates(bench, 'GLOBAL_POSITION_INT')) <= asked + 1

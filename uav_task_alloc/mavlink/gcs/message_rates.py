@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Requests the messages that the bridge needs, a bounded number of times."""
+"""Requests the messages that the bridge needs, all but positions a bounded number of times."""
 from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -8,8 +8,10 @@ from uav_task_alloc.mavlink.gcs.telemetry import ESTIMATE, RATES, Telemetry
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 
+_POSITION = d.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
 _PERIOD = 2.0  # [s] between requests
 MAX_REQUESTS = 5
+_SLOW = 10.0  # [s] between later requests of positions, without which no mission is flown
 _SILENT = 10.0  # [s] plus four periods without a message that was received before
 _QUIET = 3.0  # [s] without a position: perhaps restarted, which only new rates show
 
@@ -45,14 +47,15 @@ class MessageRates:
         if silent - self._silent and not self._telemetry.stale(now):
             self.restart(now)
         self._silent = silent
-        if now < self._due or self._requests >= MAX_REQUESTS:
+        if now < self._due:
             return []
-        missing = [number for number in rates
+        all_asked = self._requests >= MAX_REQUESTS
+        self._due = now + (_SLOW if all_asked else _PERIOD)
+        missing = [number for number in ((_POSITION,) if all_asked else rates)
                    if number in silent or number not in self._telemetry.received_ids]
         if self._requests and not missing:
             return []
         self._requests += 1
-        self._due = now + _PERIOD
         # all at first: a stream may be received at a lower rate
         out = [self._peer.command(d.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / rates[number])
                for number in (rates if self._requests == 1 else missing)]
