@@ -57,3 +57,26 @@ def test_complete_left_over_from_the_take_off_ends_no_list_of_one_task():
     assert bench.run(lambda: bench.completed() == ['A'])
     assert places(bench) == ['A']
     assert not any('was skipped' in str(note) for note in bench.notes)
+
+
+def test_the_last_task_is_complete_by_the_end_where_its_reached_is_lost_and_a_cut_follows():
+    bench = flying('px4', 'AB')
+    vehicle, ended = bench.vehicles[1], []
+
+    def tamper(direction, message, now):
+        if direction == 'up' or message.get_type() == 'MISSION_ITEM_REACHED':
+            return None if direction == 'up' else []
+        if ended and now > ended[0] + 1.0:
+            return []
+        if message.get_type() == 'MISSION_CURRENT' and (
+                message.mission_state == d.MISSION_STATE_COMPLETE and message.seq == 1):
+            ended[:1] = ended or [now]
+        return None
+
+    bench.line.tampers.append(tamper)
+    assert bench.run(lambda: bool(ended) and vehicle.flight.mode is FlightMode.HOLD)
+    bench.run(limit=10.0)
+    bench.line.tampers.clear()
+    bench.run(limit=5.0)
+    assert bench.completed() == ['A', 'B']
+    assert places(bench) == ['A', 'B']

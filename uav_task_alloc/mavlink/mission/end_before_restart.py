@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The end of a mission that PX4 has reported just before a restart, or in a frame after it."""
+"""The end of a mission that PX4 has reported: without its REACHED, or just before a restart."""
 from __future__ import annotations
 
 import math
@@ -69,9 +69,18 @@ class EndBeforeRestart:
             return
         if self._flies and message.seq == self._epoch.last_flown:
             self._ended = self._epoch.number, message.seq, now
+            self._credit_last(message.seq, now)
         if self._ending is None:
             return
         seq, item, deadline = self._ending
         if message.seq == seq and now < deadline:
             self._tasks.credit(item)
         self._ending = None
+
+    def _credit_last(self, seq: int, now: float) -> None:
+        """Complete the last item where it was inside: its REACHED may be lost before a cut."""
+        epoch, moves, positions = self._epoch, self._moves, self._positions
+        item = epoch.items[seq]
+        since, until = moves.current_since(item), min(positions.vehicle_time(now), moves.left_at)
+        if epoch.current == seq and positions.was_at(item, since, until, close=0.0):
+            self._tasks.credit(item)
