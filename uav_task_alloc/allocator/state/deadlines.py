@@ -14,7 +14,7 @@ from uav_task_alloc.allocator.state.tasks import TaskRegistry
 from uav_task_alloc.model import Task
 from uav_task_alloc.timetable import clock_text
 
-_LATE = 0.5  # [s] after its latest that is no rounding
+_LATE = 0.25  # [s] after its latest that is no rounding
 _NEWS = 2.0  # [s] change of an expected start that is published
 _SHARE = 0.05  # of the time until it, where that is longer
 _MORE = 5.0  # [s] change of a lateness that is reported again
@@ -70,7 +70,7 @@ class Deadlines:
         reports = []
         for name in worse:
             if late[name] > self._late.get(name, 0.0):
-                reports.append(f'{name} would start {late[name]:.0f} s late')
+                reports.append(f'{name} would start {max(1.0, late[name]):.0f} s late')
             self._late[name] = late[name]
             self.texts[name] = self._text(self._tasks.records[name], found[name], stamp)
         return news or bool(worse or in_time), reports
@@ -153,8 +153,9 @@ class Deadlines:
     def _text(self, record: TaskRecord, start: float, stamp: float) -> str:
         """Why a listed task is late, by how much, and what would help."""
         task = record.task
-        return (f'expected {clock_text(start, stamp)}, {start - task.latest:.0f} s after its '
-                f'latest {clock_text(task.latest, stamp)}; {self._help(record, stamp)}')
+        late = max(1.0, start - task.latest)
+        return (f'expected {clock_text(start, stamp)}, {late:.0f} s after its latest '
+                f'{clock_text(task.latest, stamp)}; {self._help(record, stamp)}')
 
     def _help(self, record: TaskRecord, stamp: float) -> str:
         task = record.task
