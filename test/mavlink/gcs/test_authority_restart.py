@@ -293,18 +293,23 @@ def test_a_climb_that_ended_while_no_bridge_ran_leaves_it_held(kind, height, sec
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 100.0)
 
 
+def move_by_stick(bench, kind, velocity, seconds):
+    """A pilot moves the vehicle, lets it come to rest and leaves it in Hold."""
+    vehicle = bench.vehicles[1]
+    vehicle.rc_mode(MODES[kind].stick)
+    vehicle.rc_stick(velocity)
+    bench.run(limit=seconds)
+    vehicle.rc_stick(None)
+    bench.run(limit=seconds)
+    vehicle.rc_mode(MODES[kind].hold)
+
+
 @PX4
 @pytest.mark.parametrize('speed', [(3.0, 0.0, 0.0), (0.0, 0.0, 3.0), (0.0, 0.0, -3.0)])
 def test_a_climb_after_which_somebody_moved_it_while_no_bridge_ran_is_a_loss(kind, speed):
     bench = killed_in_climb(kind, 20.0)
     bench.run(limit=20.0)
-    vehicle = bench.vehicles[1]
-    vehicle.rc_mode(MODES[kind].stick)
-    vehicle.rc_stick(speed)
-    bench.run(limit=3.0)
-    vehicle.rc_stick(None)
-    bench.run(limit=3.0)
-    vehicle.rc_mode(MODES[kind].hold)
+    move_by_stick(bench, kind, speed, 3.0)
     bench.kill_and_restart()
     assert bench.reaches(L, 5.0)
     assert status_is(bench, L, 'the vehicle is in Hold')
@@ -364,13 +369,7 @@ def test_a_mission_that_ended_and_after_which_it_was_moved_is_a_loss(kind, moved
     bench = flying(kind, 'AB')
     bench.kill()
     bench.run(limit=60.0)
-    vehicle = bench.vehicles[1]
-    vehicle.rc_mode(MODES[kind].stick)
-    vehicle.rc_stick(moved)
-    bench.run(limit=5.0)
-    vehicle.rc_stick(None)
-    bench.run(limit=5.0)
-    vehicle.rc_mode(MODES[kind].hold)
+    move_by_stick(bench, kind, moved, 5.0)
     bench.kill_and_restart()
     assert sends_no_command(bench, names='ABC')
     assert status_is(bench, L, 'the vehicle is in Hold')

@@ -32,13 +32,18 @@ def test_each_message_is_requested_and_received_at_its_rate(kind):
         assert received == pytest.approx(1.0 if own else rate, rel=0.15), name
 
 
-@BOTH
-def test_a_missing_message_is_requested_again_and_given_up_in_the_end(kind):
+def without_message(kind, name):
+    """A bench on the ground, a minute after its discovery, that never received one message."""
     bench = FlightBench(kind, takeoff=False)
-    bench.line.tampers.append(lambda direction, m, now: [] if (
-        m.get_type() == 'BATTERY_STATUS') else None)
+    bench.line.tampers.append(lambda direction, m, now: [] if m.get_type() == name else None)
     bench.discover()
     bench.run(limit=60.0)
+    return bench
+
+
+@BOTH
+def test_a_missing_message_is_requested_again_and_given_up_in_the_end(kind):
+    bench = without_message(kind, 'BATTERY_STATUS')
     assert len(requested_rates(bench, 'BATTERY_STATUS')) == MAX_REQUESTS
     assert len(requested_rates(bench, 'GLOBAL_POSITION_INT')) == 1
 
@@ -70,11 +75,7 @@ def test_positions_that_stop_are_requested_again(kind):
 
 @BOTH
 def test_positions_that_never_came_are_requested_until_they_come(kind):
-    bench = FlightBench(kind, takeoff=False)
-    bench.line.tampers.append(lambda direction, m, now: [] if (
-        m.get_type() == 'GLOBAL_POSITION_INT') else None)
-    bench.discover()
-    bench.run(limit=60.0)
+    bench = without_message(kind, 'GLOBAL_POSITION_INT')
     asked = len(requested_rates(bench, 'GLOBAL_POSITION_INT'))
     assert MAX_REQUESTS < asked <= MAX_REQUESTS + 6  # slowly in the end
     bench.line.tampers.clear()
