@@ -308,6 +308,22 @@ def test_a_late_current_after_a_replacement_completes_nothing_in_flight(kind):
     flown_once_each(bench, 'ABXYC')
 
 
+def test_a_set_current_of_ours_that_a_link_delays_leads_back_to_no_completed_task():
+    bench, sent = FlightBench('ardupilot').discover(), []
+    bench.assign(listed(1, A=(0.0, 100.0), B=(0.0, 130.0), C=(150.0, 80.0)))
+    assert bench.run(lambda: bench.started() and distance(bench, (0.0, 100.0, 50.0)) < 20.0)
+    bench.line.tampers.append(lambda direction, m, now: sent.append(m) if m.get_type() in (
+        'COMMAND_LONG', 'MISSION_SET_CURRENT') and direction == 'up' else None)
+    bench.assign(listed(2, B=(0.0, 130.0), C=(150.0, 80.0)))
+    assert bench.run(lambda: bench.completed() == ['B'])
+    setting, = [m for m in sent if getattr(m, 'command', d.MAV_CMD_DO_SET_MISSION_CURRENT)
+                == d.MAV_CMD_DO_SET_MISSION_CURRENT]
+    bench.run(limit=1.0)
+    bench.from_station(setting, system=OURS[0])
+    assert bench.run(lambda: bench.completed() == ['B', 'C'])
+    assert bench.flown() == [(0, 130, 50), (150, 80, 50)]
+
+
 @pytest.mark.parametrize(('x', 'speed', 'flown'), [
     (88.0, -0.1, False),  # set to the next item before it was there, it turns around
     (88.0, 3.0, False),

@@ -18,7 +18,7 @@ from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
-_ARM = 'arm'
+_ARM, _SET_CURRENT = 'arm', 'set current'
 _ARM_ATTEMPTS = 120  # one per second: a position estimate may take that long
 _CLIMB_LIMIT = 120.0  # [s] for a take-off
 _REACHED_HEIGHT = 0.9  # fraction of the commanded height
@@ -49,6 +49,9 @@ class CommandSender:
         self.climbing = False  # by a take-off of the bridge
         self.mission_refused = ''  # why the last attempt to set mission mode was refused
         self.arming_refusal = ''  # the vehicle's text on why it does not arm
+        # by seq on the wire, until when [s] the commands to set it as the current item were sent
+        self.current_set_at: dict[int, float] = {}
+        self._seq = 0  # of the latest of these commands
         self._command: Command | None = None
         self._completion: _Completion | None = None
         self._climb_until = math.inf
@@ -86,6 +89,7 @@ class CommandSender:
     def reset(self, now: float) -> None:
         """Drop everything after a restart of the vehicle."""
         self.drop()
+        self.current_set_at.clear()
         self.clear_backoff(now)
 
     def clear_backoff(self, now: float) -> None:
@@ -138,6 +142,8 @@ class CommandSender:
         if command is None:
             return None
         out = command.step(now)
+        if out and command.name == _SET_CURRENT:
+            self.current_set_at[self._seq] = now
         if command.result is CommandResult.OPEN:
             self.waits_for = command.name + self._log_arming_refusal(command, now)
             return out
@@ -202,12 +208,13 @@ class CommandSender:
             completion: called once MISSION_CURRENT confirms it.
         """
         telemetry, sent_at = self._telemetry, now
+        self._seq, self.current_set_at[seq] = seq, now
 
         def executed() -> bool:
             return telemetry.current == seq and telemetry.current_at >= sent_at
 
-        message = Command('set current', self._peer.set_current(seq), executed)
-        command = Command('set current', self._peer.command(
+        message = Command(_SET_CURRENT, self._peer.set_current(seq), executed)
+        command = Command(_SET_CURRENT, self._peer.command(
             d.MAV_CMD_DO_SET_MISSION_CURRENT, seq), executed, attempts=2, fallback=message)
         return self.start(command if self._profile.jump_command else message, now, completion)
 

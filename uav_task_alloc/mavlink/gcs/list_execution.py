@@ -2,6 +2,8 @@
 """Executes a list with tasks: upload or set current, then mission mode at the right item."""
 from __future__ import annotations
 
+import math
+
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
@@ -14,6 +16,7 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_hold import UploadHold
 from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
 from uav_task_alloc.mavlink.mission.items import TaskList
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 
 
 class ListExecution:
@@ -104,6 +107,8 @@ class ListExecution:
             sender.must_start = True
             # in mission mode it would start again at the first item
             return sender.set_mode(ModeFunction.HOLD, now)
+        if flying and onboard.set_current_to is None and self._set_back_late(now):
+            onboard.set_current_to = onboard.progress.current
         if flying and onboard.set_current_to is None:
             self._refused_list = None
             onboard.progress.note_mission_mode()
@@ -129,6 +134,20 @@ class ListExecution:
                 MissionDiff(DiffKind.JUMP, onboard.progress.items, onboard.set_current_to), now
             )
         return sender.set_mode(ModeFunction.MISSION, now)
+
+    def _set_back_late(self, now: float) -> bool:
+        """Whether a command of ours that a link delayed has set back the current item.
+
+        A command and the report of what it changed may each be late. Only items of completed tasks
+        are passed again.
+        """
+        progress, seq = self._onboard.progress, self._onboard.progress.reports.reported
+        if seq is None or not progress.reports.went_back or progress.finished:
+            return False
+        sent_at = self._sender.current_set_at.get(seq + self._onboard.own, -math.inf)
+        passed = [item.task for item in progress.items[seq:progress.current] if item.task]
+        return now - sent_at < 2.0 * MAX_MESSAGE_DELAY and bool(passed) and all(
+            task in progress.completed for task in passed)
 
     def _mission_ended(self) -> bool:
         """Whether ArduPilot has ended its mission and does not start the appended items.

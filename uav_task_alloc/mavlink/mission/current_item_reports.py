@@ -15,6 +15,7 @@ class CurrentItemReports:
 
     def __init__(self) -> None:
         self.reported: int | None = None  # the current item last reported by the vehicle
+        self.went_back = False  # the current item was a later one of this epoch before
         self.last_frame: int | None = None  # number of the last MISSION_CURRENT
         self.previous_frame: int | None = None  # number of the one before
         self._earlier: tuple[int, float] | None = None  # an item before ours, reported since [s]
@@ -30,10 +31,12 @@ class CurrentItemReports:
         """Start a new epoch at an item that the vehicle will report; None: not known."""
         self._set = None if start is None else (start, now)
         self._setting = self.reported = None
+        self.went_back = False
 
     def clear(self) -> None:
         """Reset: the mission on board is unknown."""
         self._set = self.last_frame = self.reported = None
+        self.went_back = False
 
     def begin_set(self, seq: int) -> None:
         """Note that a set-current command is about to be sent."""
@@ -41,7 +44,7 @@ class CurrentItemReports:
 
     def note_set(self, seq: int, now: float) -> None:
         """Note that the set-current command was acknowledged."""
-        self._set, self._setting = (seq, now), None
+        self._set, self._setting, self.went_back = (seq, now), None, False
 
     def is_old(self, seq: int, now: float) -> bool:
         """Whether a report is older than our set-current, or reports the item being set.
@@ -59,6 +62,8 @@ class CurrentItemReports:
 
     def note(self, seq: int, frame: int | None) -> None:
         """Store a report as the last one."""
+        if self.reported is not None and seq != self.reported:
+            self.went_back = seq < self.reported
         self.reported, self.last_frame = seq, frame
 
     def was_set_back(self, seq: int, now: float, before: int | None) -> bool:

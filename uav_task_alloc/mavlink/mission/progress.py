@@ -20,11 +20,7 @@ from uav_task_alloc.mavlink.mission.items import Item, all_alike
 from uav_task_alloc.mavlink.mission.passed_items import NO_TASKS
 from uav_task_alloc.mavlink.mission.piece_coverage import PieceCoverage
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
-from uav_task_alloc.mavlink.mission.reached_epoch import (
-    REPEAT_WINDOW,
-    PreviousEpoch,
-    ReachedEpoch,
-)
+from uav_task_alloc.mavlink.mission.reached_epoch import REPEAT_WINDOW, PreviousEpoch, ReachedEpoch
 from uav_task_alloc.mavlink.mission.reached_items import ReachedItems
 from uav_task_alloc.mavlink.mission.reached_series import ReachedSeries
 from uav_task_alloc.mavlink.mission.stop_items import place_of
@@ -71,6 +67,7 @@ class ProgressTable:
         self.end_before_restart = EndBeforeRestart(
             self._epoch, self._tasks, self.positions, self._moves)
         self.path, self.previous_returned = self.positions.path, self._epochs.has_returned
+        self.reports = self._moves.reports
 
     @property
     def epoch(self) -> int:
