@@ -94,7 +94,7 @@ class UploadBench:
         self.now, self.line = 0.0, Line(seed, loss, delay)
         self.vehicle = make_vehicle(kind, 1, capacity=capacity)
         self.peer = Peer(1)
-        self.upload = Upload(self.peer, idle_after=self.profile.idle_after,
+        self.upload = Upload(self.peer, idle_after=lambda: self.profile.idle_after,
                              rng=random.Random(seed))
         self.codecs = {'up': Codec(*OURS), 'down': Codec(1, 1)}
         self.decoders = {'up': Codec(1, 1), 'down': Codec(*OURS)}

@@ -53,7 +53,7 @@ class OnboardFence:
 
     Args:
         peer: the vehicle, with the mission type of fences or rally points.
-        idle_after: [s] after which it has given up a transfer.
+        idle_after: returns the time [s] after which it has given up a transfer.
         rng: draws back-off times.
         budget: points of its store, as far as known.
         own: items of earlier uploads of the bridge.
@@ -66,8 +66,8 @@ class OnboardFence:
         message: of the vehicle.
     """
 
-    def __init__(self, peer: Peer, idle_after: float, rng: random.Random, budget: int,
-                 own: Iterable[ItemKey] = (),
+    def __init__(self, peer: Peer, idle_after: Callable[[], float], rng: random.Random,
+                 budget: int, own: Iterable[ItemKey] = (),
                  remember: Callable[[frozenset[ItemKey]], None] = lambda own: None,
                  same: Callable[[Sequence[Item], Sequence[Item]], bool] = fences_alike) -> None:
         self._peer, self._remember, self._own = peer, remember, frozenset(own)

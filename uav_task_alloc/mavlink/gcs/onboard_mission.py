@@ -44,7 +44,7 @@ class OnboardMission:
 
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
                  rng: random.Random) -> None:
-        self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
+        self.upload = Upload(peer, idle_after=telemetry.idle_after, rng=rng)
         self.upload.is_superseded = self._overtaken
         self.upload.on_difference = self._correct
         self.upload.may_end = lambda: not (profile.atomic and self.list.leave_out_detours())

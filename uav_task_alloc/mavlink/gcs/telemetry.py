@@ -25,6 +25,7 @@ _RESTART_STEP = 2000  # [ms] decrease of time_boot_ms that shows a restart, not 
 _MAX_DELAY = 6.0  # [s] of a late message
 _IN_AIR = frozenset({
     d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING})
+_SIMULATED = 2.0  # seconds of its clock in one of this program: a simulator that runs faster
 _PACE_OVER = 0.3  # [s] between two positions that measure the pace
 # requested rate [Hz] by message id
 RATES = {
@@ -166,6 +167,14 @@ class Telemetry:
     def good_link(self, now: float) -> bool:
         """Whether the last 10 s had no gap of more than 2 s."""
         return now - self.received_at <= _QUIET and now - self._gap_at >= _STEADY
+
+    def idle_after(self) -> float:
+        """Return the time [s] after which the vehicle has given up a transfer, by its clock.
+
+        The rate of the clock counts from `_SIMULATED` on: a slow link makes it uncertain.
+        """
+        rate = self.clock_rate.value
+        return self._profile.idle_after / (rate if rate >= _SIMULATED else 1.0)
 
     def note_acknowledged(self, mode: ModeFunction) -> None:
         """Take a mode that the vehicle has acknowledged; its heartbeats may be older."""

@@ -75,11 +75,11 @@ class VehicleFence:
         self._authority, self._policy = authority, policy
         fence_peer = replace(peer, mission_type=d.MAV_MISSION_TYPE_FENCE)
         self._own: dict[str, frozenset[ItemKey]] = {}  # items of the bridge, by store
-        self.transfer = OnboardFence(fence_peer, profile.idle_after, rng,
+        self.transfer = OnboardFence(fence_peer, telemetry.idle_after, rng,
                                      profile.rules.fence_points, memory.own,
                                      lambda own: self._save('fence', own, memory))
         self.rally = RallyTransfer(OnboardFence(
-            replace(peer, mission_type=d.MAV_MISSION_TYPE_RALLY), profile.idle_after, rng,
+            replace(peer, mission_type=d.MAV_MISSION_TYPE_RALLY), telemetry.idle_after, rng,
             RALLY_BUDGET, memory.own, lambda own: self._save('rally', own, memory), rally_alike))
         self.parameters = FenceParameters(peer, profile)
         onboard.list.read_speed = self.parameters.cruise_speed

@@ -106,7 +106,7 @@ class Upload:
 
     Args:
         peer: the vehicle.
-        idle_after: time [s] after which the vehicle has given up a transfer.
+        idle_after: returns the time [s] after which the vehicle has given up a transfer.
         rng: draws the back-off times.
         same: whether items read back are those sent.
 
@@ -116,7 +116,7 @@ class Upload:
         now: steady time [s].
     """
 
-    def __init__(self, peer: Peer, *, idle_after: float, rng: random.Random,
+    def __init__(self, peer: Peer, *, idle_after: Callable[[], float], rng: random.Random,
                  same: Callable[[Sequence[Item], Sequence[Item]], bool] = all_alike) -> None:
         self._peer, self._idle_after, self._rng, self._same = peer, idle_after, rng, same
         self.state = UploadState.IDLE
@@ -299,7 +299,7 @@ class Upload:
             UploadState.SENDING: INACTIVITY,
             UploadState.GRACE: GRACE,
             UploadState.CONFIRMING: CONFIRM,
-            UploadState.DRAINING: self._idle_after,
+            UploadState.DRAINING: self._idle_after(),
         }.get(state, 0.0)
 
     def _count(self, now: float) -> None:
@@ -313,7 +313,7 @@ class Upload:
             self._sent_last = self._accepted = self._read_twice = False
             self._requested = None
         self._counts += 1
-        if 0.0 < now - self._read_at < self._idle_after:
+        if 0.0 < now - self._read_at < self._idle_after():
             # it may still be sending its mission, and would refuse (PX4)
             self._out.append(self._peer.ack(dialect.MAV_MISSION_ACCEPTED))
         self._out.append(self._peer.count(len(self._mission.items)))
