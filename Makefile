@@ -3,7 +3,7 @@
 # survey a field.   make test: every check.
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
-.PHONY: demo test checked coverage build docs site clean
+.PHONY: demo test linted collected coverage build docs site clean
 # messages, kernels and checks of the sources at a time; programs that recipes start have their own
 MAKEFLAGS += -j2
 unexport MAKEFLAGS
@@ -26,12 +26,15 @@ demo: build
 	@$(RUN) && install/uav_task_alloc/lib/uav_task_alloc/demo \
 		--scenario config/scenarios/$(SCENARIO).yaml --out out/$(SCENARIO) --limit 200
 
-test: build checked
+test: build linted collected
 	@echo '== pytest, $(WORKERS) at a time' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest -n $(WORKERS) --dist worksteal --durations 15
 
-# What waits for no kernels. Collecting compiles the tests once for all workers; pytest shows its errors below
-checked: install/.built
+# What waits for no kernels: linting, and collecting, which compiles the tests once for all workers;
+# pytest shows its errors later
+linted: install/.built
 	@echo '== ruff, mypy' && .ros/bin/ruff check . && .ros/bin/mypy
+
+collected: install/.built
 	@tools/browser.sh .ros > /dev/null
 	@$(RUN) && REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null || :
 
