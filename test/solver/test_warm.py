@@ -2,6 +2,7 @@
 """Warm starts from an earlier plan."""
 from dataclasses import replace
 
+import pytest
 from plan_checks import check, make
 
 from uav_task_alloc import Plan, Task, ThreatZone, Uav, plan
@@ -87,3 +88,15 @@ def test_a_uav_that_joins_is_used():
     joined = [*UAVS, Uav('new', (500.0, 500.0, 0.0))]
     result = quick(joined, TASKS, warm=BEFORE)
     check(result, joined, TASKS)
+
+
+@pytest.mark.parametrize('timed_last', [False, True])
+def test_windows_may_come_and_go_between_plans(timed_last):
+    windows = [replace(task, latest=1e6) for task in TASKS]
+    first, then = (TASKS, windows) if timed_last else (windows, TASKS)
+    before = quick(UAVS, first, max_iterations=200)
+    alone = replace(before, state=None)  # the routes, without what was computed for them
+    same = [quick(UAVS, then, warm=warm, max_iterations=200) for warm in (before, alone)]
+    for each in same:
+        check(each, UAVS, then)
+    assert same[0].routes == same[1].routes

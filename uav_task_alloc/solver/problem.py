@@ -108,7 +108,8 @@ class Problem:
 
 def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
                  locked: Mapping[str, tuple[Task, ...]], limits: Limits, rules: Rules,
-                 known: Problem | None = None, search: PathPreparation | None = None) -> Problem:
+                 known: Problem | None = None, search: PathPreparation | None = None,
+                 near: bool = True) -> Problem:
     """Build a problem.
 
     Args:
@@ -120,6 +121,7 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
         rules: how routes end, ranges, weights.
         known: an earlier problem, of which known lengths and neighbours are reused.
         search: searches for paths around zones within the budget; None: without limit.
+        near: False: without zones, arrays have no neighbours and no costs of unassigned tasks.
 
     Returns:
         The problem, with neighbours and costs filled in.
@@ -127,9 +129,9 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
     unlocked = _not_locked(tasks, locked) if locked else tuple(tasks)
     before = known.distances if known and limits.same_but_zones(known.limits) else None
     distances = _distances(uavs, unlocked, locked, limits, before, search)
-    crossed = _crossed(tasks, limits)
+    crossed, near = _crossed(tasks, limits), near or bool(limits.zones)
     problem = Problem(tuple(uavs), unlocked, locked, limits, rules, distances,
-                      _empty_arrays(uavs, unlocked, rules, distances), 1.0,
+                      _empty_arrays(uavs, unlocked, rules, distances, near), 1.0,
                       {task.id: i for i, task in enumerate(unlocked)},
                       _ends(uavs, unlocked, locked), crossed)
     if search is not None and limits.zones:
@@ -148,7 +150,7 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
     arrays = problem.arrays
     floor = float(np.maximum(0.0, arrays.empty_route_length - arrays.range_left).sum())
     return replace(problem, arrays=arrays._replace(excess_floor=floor),
-                   scale=_fill_neighbours(problem, known, search))
+                   scale=_fill_neighbours(problem, known, search) if near else 1.0)
 
 
 def _not_locked(tasks: Sequence[Task], locked: Mapping[str, tuple[Task, ...]]) -> tuple[Task, ...]:
@@ -239,10 +241,10 @@ def _compatible(uavs: Sequence[Uav], tasks: Sequence[Task]) -> NDArray[np.bool_]
 
 
 def _empty_arrays(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
-           distances: Distances) -> Arrays:
-    """Arrays whose neighbours and costs are not filled in yet. O(m n)."""
+                  distances: Distances, near: bool = True) -> Arrays:
+    """Arrays whose neighbours and costs are not filled in yet; near: whether any are. O(m n)."""
     m, n = len(uavs), len(tasks)
-    k, s = min(NEIGHBOURS, max(0, n - 1)), min(STARTS, m)
+    k, s = (min(NEIGHBOURS, max(0, n - 1)), min(STARTS, m)) if near else (0, 0)
     compatible = _compatible(uavs, tasks)
     return Arrays(
         m, m + n, rules.returns, rules.hard,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,7 @@ WINDOW_NEIGHBOURS = 60  # nearest tasks of a task that may precede or follow it
 NEAR_CLASSES = 6  # nearest classes of UAVs that are alike
 UNSERVED_LEGS = 20.0  # first price of an average task, in mean legs
 MAX_UNSERVED_GROWTH = 300.0  # highest price of a task over the first
+_TASK_NUMBERS = attrgetter('earliest', 'latest', 'payload', 'value', 'announced', 'release')
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +149,7 @@ def _ways(problem: Problem, nodes: int,
     far = np.arange(m, m + len(tasks), dtype=np.int64)
     with_path = [i for i, task in enumerate(tasks) if task.path]
     far[with_path] = nodes + np.arange(len(with_path))
-    lengths = np.array([task.path_length for task in tasks], np.float64)
+    lengths = np.array([task.path_length if task.path else 0.0 for task in tasks], np.float64)
     if not with_path:
         return far, lengths, np.empty((len(classes), 0))
     along = [[service_seconds(fleet, each) for task in tasks for each in (task, task.turned)]
@@ -192,14 +195,15 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
         task for held in problem.locked.values() for task in held)))
     hard = math.isinf(goal.lateness)
     loaded = {name for names in aboard.values() for name in names}
-    values = np.array([(_least_service(uavs, task), task.earliest, task.latest, task.payload,
-                        task.value, task.announced, task.release)
-                       for task in tasks]).reshape(-1, 7)
+    values = np.fromiter(chain.from_iterable(map(_TASK_NUMBERS, tasks)), np.float64,
+                         6 * n).reshape(n, 6)
+    rows[:, at.SERVICE] = [_least_service(uavs, task) if task.path or task.actions
+                           else task.service_time for task in tasks]
     latest = at.CLOSES if hard else at.DUE
-    rows[:, [at.SERVICE, at.OPENS, latest, at.LOAD, at.WORTH, at.ANNOUNCED]] = values[:, :6]
+    rows[:, [at.OPENS, latest, at.LOAD, at.WORTH, at.ANNOUNCED]] = values[:, :5]
     rows[:, at.WEIGHT] = goal.response * rows[:, at.WORTH] / total
-    rows[:, at.WIDTH] = np.minimum(values[:, 2], 1e9) - np.maximum(values[:, 1], -1e9)
-    release = np.where(values[:, 6] > 0.0, values[:, 6], -math.inf)
+    rows[:, at.WIDTH] = np.minimum(values[:, 1], 1e9) - np.maximum(values[:, 0], -1e9)
+    release = np.where(values[:, 5] > 0.0, values[:, 5], -math.inf)
     whole_trip = np.array([task.payload > 0.0 and task.id not in loaded for task in tasks], bool)
     rows[whole_trip, at.TRIP_RELEASE] = release[whole_trip]
     rows[~whole_trip, at.RELEASE] = release[~whole_trip]

@@ -13,7 +13,7 @@ from uav_task_alloc.kernel_cache import (
     NOTICE,
     TIMED_FIRST_WORK,
     TIMED_SEARCH_WORK,
-    ZONES_WORK,
+    TIMED_ZONES_WORK,
 )
 from uav_task_alloc.model import Plan, Task, ThreatZone, Uav, turned_tasks
 from uav_task_alloc.solver.chain_q import run_colonies
@@ -70,7 +70,7 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     # those that are locked are turned themselves
     search.reversed = before.reversed - {task.id for row in locked.values() for task in row}
     locked = {uav_id: tuple(turned_tasks(row, reversed)) for uav_id, row in locked.items()}
-    base = make_problem(uavs, tasks, locked, limits, rules, known, search)
+    base = make_problem(uavs, tasks, locked, limits, rules, known, search, near=False)
     problem = make_timed(base, _aboard(uavs, tasks, base.locked, before), before.timed)
     recorder = TimedRecorder(clock, began, budget, max_iterations, stop, threads,
                              warm is not None, on_iteration, problem=problem)
@@ -159,7 +159,7 @@ def load_timed_kernels(zones: bool = False, search: bool = True, paths: bool = F
         search: False: only what a plan of no iterations needs.
         paths: those of problems with tasks that have a path, not of others.
     """
-    first = TIMED_FIRST_WORK.plus(ZONES_WORK if zones else NO_WORK)
+    first = TIMED_FIRST_WORK.plus(TIMED_ZONES_WORK if zones else NO_WORK)
     with NOTICE.until_loaded(('timed', zones, paths), first, TIMED_SEARCH_WORK, search):
         _call_kernels(zones, search, paths)
 
@@ -173,7 +173,7 @@ def _call_kernels(zones: bool, search: bool, paths: bool) -> None:
         tasks += (Task('line', (1.0, 2.0, 0.0), path=((1.0, 2.0, 0.0), (4.0, 2.0, 0.0)),
                        reversible=True),)
     limits = Limits((ThreatZone.cylinder('z', (2.5, 1.0), 0.3),) if zones else ())
-    problem = make_timed(make_problem(uavs, tasks, {}, limits, Rules(trips=2)), {})
+    problem = make_timed(make_problem(uavs, tasks, {}, limits, Rules(trips=2), near=False), {})
     recorder = TimedRecorder(lambda: 0.0, 0.0, 1.0, max_iterations=100 * search, problem=problem)
     _improve(recorder, 0, WarmState(), None)
     to_timed_plan(problem, recorder, recorder.best, '', False)  # with the reason of the last task
