@@ -48,7 +48,7 @@ coverage: build
 build: install/.built install/.compiled
 
 .ros/.made: tools/ros_env/setup.sh tools/ros_env/requirements.txt tools/ros_env/python.txt
-	@echo '== ROS 2 Jazzy and Python packages into .ros/ (once, about a minute)'
+	@echo '== ROS 2 Jazzy and Python packages into .ros/ (once, up to a minute)'
 	@$(STOP); tools/ros_env/setup.sh .ros
 	@touch $@
 
