@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Holds of an operator on both simulated autopilots: before transfers, kept, ended, refused."""
+import dataclasses
 import math
 
 import pytest
 from authority_bench import MODES
+from findings_bench import listed
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 
@@ -11,6 +13,7 @@ from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.status import UavMode
+from uav_task_alloc.model import ThreatZone
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 HOLD = HoldRequest('operator', True, 'order o1 of ann')
@@ -155,3 +158,64 @@ def test_a_hold_file_that_cannot_be_used_is_reported(tmp_path):
     assert store.load_hold('uav_1') == ''
     assert len(reports) == 2
     assert all('not used' in text for text in reports)
+
+
+def least_distance(bench, zone):
+    """Records how near [m] to the centre of a zone the vehicle comes, in plan view."""
+    least, vehicle = [math.inf], bench.vehicles[1]
+    step = vehicle.step
+
+    def stepped(now):
+        least[0] = min(least[0], math.dist(vehicle.flight.body.position[:2], zone.center[:2]))
+        return step(now)
+    vehicle.step = stepped
+    return least
+
+
+def announce(bench, zone):
+    bench.executor().policy = dataclasses.replace(bench.executor().policy, zones=(zone,))
+
+
+def lose_items(bench, while_true):
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        direction == 'up' and m.get_type() == 'MISSION_ITEM_INT' and while_true()) else None)
+
+
+@BOTH
+def test_a_vehicle_holds_before_a_new_zone_until_it_has_the_list_around_it(kind):
+    bench, zone = FlightBench(kind).discover(), ThreatZone.cylinder('farm', (0.0, 250.0), 20.0)
+    least = least_distance(bench, zone)
+    bench.assign(listed(1, A=(0.0, 400.0)))
+    assert bench.run(lambda: bench.state().position[1] > 60.0)
+    stalled = [True]
+    lose_items(bench, lambda: stalled[0])
+    announce(bench, zone)
+    bench.assign(listed(2, B=(80.0, 250.0), A=(0.0, 400.0)))
+    assert bench.run(lambda: is_held(bench), 60.0)
+    bench.run(limit=20.0)
+    assert is_held(bench)
+    if kind == 'px4':  # ArduPilot holds for the upload at once
+        assert bench.executor().holds.reason.startswith('zone: farm is ahead on the way')
+    stalled[0] = False
+    assert bench.run(lambda: bench.completed() == ['B', 'A'], 200.0)
+    assert least[0] > zone.radius
+
+
+@BOTH
+def test_a_list_that_leads_through_a_zone_is_flown_once_it_is_on_board(kind):
+    bench, zone = FlightBench(kind).discover(), ThreatZone.cylinder('farm', (0.0, 250.0), 20.0)
+    announce(bench, zone)
+    bench.assign(listed(1, A=(0.0, 400.0)))
+    assert bench.run(lambda: bench.completed() == ['A'], 200.0)
+
+
+def test_px4_does_not_take_a_list_to_whose_first_task_a_zone_is_now_between():
+    bench, zone = FlightBench('px4').discover(), ThreatZone.cylinder('farm', (100.0, 150.0), 30.0)
+    least = least_distance(bench, zone)
+    bench.assign(listed(1, A=(300.0, 0.0)))
+    announce(bench, zone)
+    assert bench.run(lambda: bench.state().position[0] > 20.0)
+    lose_items(bench, lambda: bench.vehicles[1].flight.body.position[0] < 180.0)
+    bench.assign(listed(2, T=(0.0, 300.0), U=(0.0, 400.0)))
+    assert bench.run(lambda: bench.completed() == ['T', 'U'], 200.0)
+    assert least[0] > zone.radius

@@ -324,6 +324,19 @@ def test_a_set_current_of_ours_that_a_link_delays_leads_back_to_no_completed_tas
     assert bench.flown() == [(0, 130, 50), (150, 80, 50)]
 
 
+@pytest.mark.parametrize(('before', 'reported', 'sent_again'), [
+    (0, 2, False), (0, 1, False), (0, 0, True), (2, 2, True)])
+def test_a_set_current_is_not_sent_again_once_a_later_item_is_reported(
+        before, reported, sent_again):
+    executor, done = flying('px4', 'ABCD').executor(), []
+    telemetry, sender = executor.telemetry, executor.sender
+    telemetry.current = before
+    assert sender.set_current(1, 100.0, done.append)
+    telemetry.current, telemetry.current_at = reported, 100.5
+    assert bool(sender.finish(101.5)) is sent_again
+    assert bool(done) is not sent_again
+
+
 @pytest.mark.parametrize(('x', 'speed', 'flown'), [
     (88.0, -0.1, False),  # set to the next item before it was there, it turns around
     (88.0, 3.0, False),

@@ -349,3 +349,20 @@ def test_a_way_that_a_list_turns_during_a_long_upload_counts_as_it_is_flown(turn
     assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
     bench.run(limit=10.0)
     assert [bench.flown().count(point) for point in line.path[1:-1]] == [1] * (2 + closed)
+
+
+@BOTH
+@pytest.mark.parametrize('late', [0.0, 0.5])
+def test_a_strip_that_begins_in_a_silence_is_flown_once(kind, late):
+    strips, lost = [strip(k, actions=()) for k in range(3)], {}
+    bench, track = surveying(kind, list_of(*strips, turned=('F#1',)))
+    bench.line.tampers.append(lambda direction, m, now: [] if direction == 'down' and (
+        now < lost.get(m.get_type(), -math.inf)) else None)
+    assert bench.run(lambda: bench.completed() == ['F#0'])
+    x, y, _ = strips[1].path[-1]
+    assert bench.run(lambda: math.dist(bench.vehicles[1].flight.body.position[:2], (x, y)) < 10.0)
+    lost['GLOBAL_POSITION_INT'] = bench.now + 6.0
+    lost['MISSION_CURRENT'] = lost['MISSION_ITEM_REACHED'] = bench.now + 6.0 + late
+    assert bench.run(lambda: len(bench.completed()) == 3, 300.0)
+    for each in strips:
+        assert set(track.times_flown(each)) == {1}

@@ -207,11 +207,15 @@ class CommandSender:
             now: steady time [s].
             completion: called once MISSION_CURRENT confirms it.
         """
-        telemetry, sent_at = self._telemetry, now
+        telemetry, sent_at, before = self._telemetry, now, self._telemetry.current
         self._seq, self.current_set_at[seq] = seq, now
 
         def executed() -> bool:
-            return telemetry.current == seq and telemetry.current_at >= sent_at
+            if telemetry.current is None or telemetry.current_at < sent_at:
+                return False
+            # points of a way may be passed faster than they are reported
+            return telemetry.current == seq or (
+                before is not None and before < seq < telemetry.current)
 
         message = Command(_SET_CURRENT, self._peer.set_current(seq), executed)
         command = Command(_SET_CURRENT, self._peer.command(

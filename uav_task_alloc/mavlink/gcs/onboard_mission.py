@@ -47,7 +47,6 @@ class OnboardMission:
         self.upload = Upload(peer, idle_after=telemetry.idle_after, rng=rng)
         self.upload.is_superseded = self._overtaken
         self.upload.on_difference = self._correct
-        self.upload.may_end = lambda: not (profile.atomic and self.list.leave_out_detours())
         self.progress = ProgressTable(telemetry.frames, profile.atomic, profile.rules.loiters)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)

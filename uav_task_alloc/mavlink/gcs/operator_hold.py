@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Holds a vehicle for an operator, or to keep it separate: before any transfer, and until it ends.
+"""Holds a vehicle for an operator, to keep it separate, or at a zone on its way.
+
+A hold is sent before any transfer, and kept until it ends.
 
 Whether HOLD may be sent is asked of the authority over the vehicle, as for any command.
 """
@@ -16,15 +18,18 @@ from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessage
 from uav_task_alloc.mavlink.gcs.hand_over import REST_SPEED
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.zone_ahead import ZoneAhead
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Point
+
+_ZONE = 'zone'
 
 
 @dataclass(frozen=True, slots=True)
 class HoldRequest:
     """A hold, or its end."""
 
-    source: str  # `operator` or `separation`; the last request of each counts
+    source: str  # `operator`, `separation` or `zone`; the last request of each counts
     hold: bool  # or go on
     reason: str = ''  # for users
 
@@ -53,6 +58,8 @@ class HoldRule:
         self._ordered_at: Point | None = None  # [m] where it was when the hold was ordered
         self._reported = False  # where it came to rest
         self._logged = ''  # why HOLD is not sent
+        self._zone_ahead = ZoneAhead(telemetry, onboard, profile)
+        onboard.upload.may_end = self._zone_ahead.may_take_upload
 
     @property
     def reason(self) -> str:
@@ -83,6 +90,7 @@ class HoldRule:
 
     def hold(self, now: float) -> NextMessages:
         """Set HOLD before anything else is sent; None: it holds, or is not to."""
+        self._guard(now)
         if not self._requests or not self._telemetry.airborne or self._sender.climbing:
             return None
         self._watch.replacing_since = None  # it holds for longer than an upload takes
@@ -100,6 +108,18 @@ class HoldRule:
         if self._sender.backing_off(now):
             return []
         return self._sender.set_mode(ModeFunction.HOLD, now)
+
+    def _guard(self, now: float) -> None:
+        """Hold before a zone to which the mission on board leads, until it has the list."""
+        held, flying = _ZONE in self._requests, self._telemetry.mode is ModeFunction.MISSION
+        may_fly = self._telemetry.airborne and self._watch.authority.held
+        zone = self._zone_ahead.on_board(held) if may_fly and (held or flying) else None
+        if zone is None or self._onboard.verified():
+            self._end(_ZONE)
+        elif not held and ModeFunction.HOLD in self._profile.set_mode and not (
+                self._profile.rules.loiters):
+            self.request(HoldRequest(_ZONE, True, f'{zone.id} is ahead on the way that it has on '
+                                     'board'), now)
 
     def stay(self, now: float) -> NextMessages:
         """Let the list be transferred while it holds, but no more; None: it is not to hold."""

@@ -60,6 +60,7 @@ class PieceCoverage:
         self._restored: set[str] = set()  # under way when the previous run of the bridge ended
         self.recorded = False  # what was flown before this run is known by its file
         self._recent: deque[PositionSample] = deque(maxlen=_RECENT)  # in mission mode, without gap
+        self._unseen_since: PositionSample | None = None  # the last one before a gap before these
         self._fastest = 0.0  # [m/s]
 
     def set_listed(self, stops: Iterable[MissionStop]) -> None:
@@ -147,7 +148,7 @@ class PieceCoverage:
         """
         task = item.task if item is not None and in_mission and item.along else None
         if not in_mission:
-            self._recent.clear()
+            self._forget_recent()
         elif task is not None or (item is not None and item.task != self._latest):
             self._latest = task
         piece = None if task is None else self._pieces.get(task)
@@ -174,6 +175,11 @@ class PieceCoverage:
             piece.gone, piece.seen, piece.off = False, None, None
         piece.in_silence = False
         if piece.seen is None:
+            unseen, first = self._unseen_since, next(iter(self._recent), None)
+            if unseen is not None and first is not None:  # it may have come to it in the gap
+                piece.seen = unseen.t
+                piece.off = unseen.t, math.dist(unseen.position, piece.next_point())
+                self._follow(piece, first, unseen.t, self._fastest)
             for sample in self._recent:
                 self._follow(piece, sample, sample.t, self._fastest)
             if piece.off is not None:  # it may have come to it since, or it cannot
@@ -187,6 +193,7 @@ class PieceCoverage:
         Args:
             item: its first one.
         """
+        self._unseen_since = None
         for name in (self._under_way, self._ending):
             piece = self._pieces.get(name or '')
             if piece is not None and not (
@@ -210,13 +217,21 @@ class PieceCoverage:
         """
         before, self._sampled, self._fastest = self._sampled, sample.t, fastest
         if not 0.0 <= sample.t - before <= GAP:
-            self._recent.clear()
+            last = self._recent[-1] if self._recent and sample.t > before else None
+            self._forget_recent()
+            self._unseen_since = last
+        elif len(self._recent) == _RECENT:
+            self._unseen_since = None
         self._recent.append(sample)
         for name in {self._under_way, self._ending, *self._restored}:
             piece = self._pieces.get(name or '')
             if piece is not None and not piece.gone:
                 self._follow(piece, sample, before, fastest)
                 piece.missed = piece.off is not None
+
+    def _forget_recent(self) -> None:
+        self._recent.clear()
+        self._unseen_since = None
 
     def _follow(self, piece: Piece, sample: PositionSample, before: float,
                 fastest: float) -> None:
