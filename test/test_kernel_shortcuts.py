@@ -259,13 +259,38 @@ print(allocating_kernel(count)(5))
 NONE = 'from uav_task_alloc import kernel_shortcuts; kernel_shortcuts._found = tuple'
 
 
+def python_prints(source, folder):
+    """What a Python prints that runs a program with kernels."""
+    (folder / 'program.py').write_text(source)
+    package = Path(kernel_shortcuts.__file__).parents[1]
+    done = subprocess.run([sys.executable, folder / 'program.py'], capture_output=True, text=True,
+                          env={**os.environ, 'PYTHONPATH': str(package)})
+    assert not done.stderr
+    return done.stdout
+
+
 @pytest.mark.parametrize('before', ['', NONE])
 def test_functions_of_numba_give_the_same_with_and_without(before, tmp_path):
-    (tmp_path / 'count.py').write_text(PRINT.format(before=before))
-    package = Path(kernel_shortcuts.__file__).parents[1]
-    done = subprocess.run([sys.executable, tmp_path / 'count.py'], capture_output=True, text=True,
-                          env={**os.environ, 'PYTHONPATH': str(package)})
-    assert done.stdout == '(10, 0.25)\n', done.stderr
+    assert python_prints(PRINT.format(before=before), tmp_path) == '(10, 0.25)\n'
+
+
+BLAS = """
+import sys
+import numpy as np
+from numba import njit
+from uav_task_alloc.kernel import kernel
+
+@kernel
+def next_one(n):
+    return n + 1
+
+assert next_one(1) == 2
+print('scipy.linalg' in sys.modules, njit(lambda a: np.dot(a, a))(np.full(2, 3.0)))
+"""
+
+
+def test_a_kernel_needs_no_scipy_and_other_code_has_its_blas(tmp_path):
+    assert python_prints(BLAS, tmp_path) == 'False 18.0\n'
 
 
 def test_a_kernel_raises_what_a_function_of_numba_raises():

@@ -222,6 +222,13 @@ def _inner_lowering(original: Any) -> Any:
     return run_pass
 
 
+def _no_look_for_blas(original: Any) -> Any:
+    """BLAS: numba imports scipy.linalg to know whether there is one, and where one is used."""
+    def ensure_blas() -> None:
+        """No kernel uses one."""
+    return ensure_blas
+
+
 SHORTCUTS = (
     Shortcut('numba.core.targetconfig', 'TargetConfig.__hash__', (), _faster_hash),
     Shortcut('numba.core.targetconfig', 'TargetConfig.__eq__', ('other',), _faster_equality),
@@ -236,7 +243,8 @@ SHORTCUTS = (
              _shorter_post_processing),
     Shortcut('llvmlite.ir._utils', 'NameScope.register', ('name', 'deduplicate'), _faster_names),
     Shortcut('numba.core.lowering', 'Lower._find_singly_assigned_variable', (), _fewer_slots),
-    Shortcut('numba.core.typed_passes', 'NativeLowering.run_pass', ('state',), _inner_lowering))
+    Shortcut('numba.core.typed_passes', 'NativeLowering.run_pass', ('state',), _inner_lowering),
+    Shortcut('numba.np.linalg', 'ensure_blas', (), _no_look_for_blas))
 
 
 def _hash_ignores_values(kind: Any) -> bool:
