@@ -3,9 +3,10 @@
 # survey a field.   make test: every check.
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
-.PHONY: demo test linted collected coverage build docs site clean
-# messages, kernels and checks of the sources at a time; programs that recipes start have their own
-MAKEFLAGS += -j2
+.PHONY: demo test browser linted collected coverage build docs site clean
+# messages, kernels, and checks of the sources or the browser's packages at a time; programs that
+# recipes start have their own
+MAKEFLAGS += -j3
 unexport MAKEFLAGS
 
 # some containers set it: then each process would compile the sources again, each test worker the tests
@@ -26,16 +27,18 @@ demo: build
 	@$(RUN) && install/uav_task_alloc/lib/uav_task_alloc/demo \
 		--scenario config/scenarios/$(SCENARIO).yaml --out out/$(SCENARIO) --limit 200
 
-test: build linted collected
+test: build browser linted collected
 	@echo '== pytest, $(WORKERS) at a time' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest -n $(WORKERS) --dist worksteal --durations 15
 
-# What waits for no kernels: linting, and collecting, which compiles the tests once for all workers;
-# pytest shows its errors later
+# Chromium, where there is none
+browser: .ros/.made
+	@tools/browser.sh .ros > /dev/null
+
 linted: install/.built
 	@echo '== ruff, mypy' && .ros/bin/ruff check . && .ros/bin/mypy
 
-collected: install/.built
-	@tools/browser.sh .ros > /dev/null
+# Collecting compiles the tests once for all workers; pytest shows its errors later
+collected: build
 	@$(RUN) && REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null || :
 
 # Line coverage of the package without nodes; below the floor of setup.cfg it fails
