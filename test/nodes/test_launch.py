@@ -159,9 +159,9 @@ def test_finding_37_a_fleet_flies_a_scenario_to_its_end_with_its_values(
         'uav_timeout': 2.0}}}))
     fleet = launch('fleet', scenario=moved, bridge_params=bridge_params,
                    allocator_params=allocator_params)
-    start('fleet_sim', '-p', f'scenario:={moved}', '-p', 'speedup:=12.0', '-p',
+    start('fleet_sim', '-p', f'scenario:={moved}', '-p', 'speedup:=8.0', '-p',
           f'target:=127.0.0.1:{port}')
-    start('scenario_player', '-p', f'scenario:={moved}', '-p', 'speedup:=12.0', '-p',
+    start('scenario_player', '-p', f'scenario:={moved}', '-p', 'speedup:=8.0', '-p',
           'wait_for_plan:=true')
     flies_to_its_end(probe, moved)
     assert fleet.stop() == 0, fleet.output()
