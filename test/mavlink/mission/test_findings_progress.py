@@ -324,6 +324,28 @@ def test_a_set_current_of_ours_that_a_link_delays_leads_back_to_no_completed_tas
     assert bench.flown() == [(0, 130, 50), (150, 80, 50)]
 
 
+def test_no_upload_begins_while_a_repeated_command_of_mission_mode_may_still_arrive():
+    bench, modes = FlightBench('ardupilot').discover(), []
+    bench.assign(listed(1, A=(0.0, 400.0)))
+    assert bench.run(lambda: bench.started() and distance(bench, (0.0, 0.0, 50.0)) > 60.0)
+
+    def late(direction, m, now):
+        if direction != 'up' or getattr(m, 'param2', 0) != MISSION or len(modes) == 2:
+            return None
+        modes.append(now)
+        return [(1.2, m)] if len(modes) == 1 else [(0.7, m)]
+    bench.line.tampers.append(late)
+    bench.assign(listed(2, B=(100.0, 200.0), C=(100.0, 300.0)))
+    assert bench.run(lambda: bench.started() == ['A', 'B'])
+    bench.assign(listed(3, D=(-100.0, 200.0), B=(100.0, 200.0), C=(100.0, 300.0)))
+    until = bench.now + 20.0
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT', lambda m: m.seq > 1 and bench.now < until)
+    assert bench.run(lambda: len(bench.completed()) == 3)
+    assert bench.completed() == ['D', 'B', 'C']
+    assert bench.flown() == [(-100, 200, 50), (100, 200, 50), (100, 300, 50)]
+    assert len(modes) == 2
+
+
 @pytest.mark.parametrize(('before', 'reported', 'sent_again'), [
     (0, 2, False), (0, 1, False), (0, 0, True), (2, 2, True)])
 def test_a_set_current_is_not_sent_again_once_a_later_item_is_reported(

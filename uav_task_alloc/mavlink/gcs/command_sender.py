@@ -52,6 +52,7 @@ class CommandSender:
         # by seq on the wire, until when [s] the commands to set it as the current item were sent
         self.current_set_at: dict[int, float] = {}
         self._seq = 0  # of the latest of these commands
+        self.mission_repeated_at = -math.inf  # [s] the command of mission mode was sent again
         self._command: Command | None = None
         self._completion: _Completion | None = None
         self._climb_until = math.inf
@@ -144,6 +145,8 @@ class CommandSender:
         out = command.step(now)
         if out and command.name == _SET_CURRENT:
             self.current_set_at[self._seq] = now
+        elif out and command.name == _mode_name(ModeFunction.MISSION):
+            self.mission_repeated_at = now
         if command.result is CommandResult.OPEN:
             self.waits_for = command.name + self._log_arming_refusal(command, now)
             return out

@@ -69,6 +69,10 @@ class ListExecution:
                 and telemetry.mode is ModeFunction.MISSION):
             sender.must_start, self._watch.replacing_since = True, now
             return sender.set_mode(ModeFunction.HOLD, now)
+        if (diff.kind is DiffKind.REPLACE and not self._profile.atomic and telemetry.airborne
+                and now - sender.mission_repeated_at < MAX_MESSAGE_DELAY):
+            # its mission would be replaced while it flies it
+            return sender.wait_for('the end of its mode commands that may be on the way')
         if telemetry.airborne and onboard.list.leave_out_detours():
             return self.update_mission(now)
         return onboard.begin_upload(diff, now)

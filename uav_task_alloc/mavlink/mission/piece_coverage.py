@@ -29,7 +29,8 @@ from uav_task_alloc.model import Point
 
 _CORRIDOR, _CORRIDOR_PLANE = 10.0, 150.0  # [m] from a way at which a vehicle still follows it
 _SLACK = 10.0  # [m] of positions that are not exact
-_RECENT = 32  # positions: six seconds, by which the report of the current item may be late
+_LATE = 32  # positions: six seconds, by which the report of the current item may be late
+_RECENT = 512  # positions in which that report may be late in a simulation that runs faster
 _MARGIN = 1.2  # of a speed
 _SHORTEST = 1.0  # [m] of a flown part or of a rest
 _KEPT = 64  # pieces
@@ -175,12 +176,13 @@ class PieceCoverage:
             piece.gone, piece.seen, piece.off = False, None, None
         piece.in_silence = False
         if piece.seen is None:
-            unseen, first = self._unseen_since, next(iter(self._recent), None)
-            if unseen is not None and first is not None:  # it may have come to it in the gap
-                piece.seen = unseen.t
-                piece.off = unseen.t, math.dist(unseen.position, piece.next_point())
-                self._follow(piece, first, unseen.t, self._fastest)
-            for sample in self._recent:
+            recent, begin, unseen = list(self._recent), piece.next_point(), self._unseen_since
+            at = next((n for n in reversed(range(len(recent))) if math.dist(
+                recent[n].position, begin) <= self._corridor), None)
+            if at is None and unseen is not None and 0 < len(recent) <= _LATE:
+                piece.seen, piece.off = unseen.t, (unseen.t, math.dist(unseen.position, begin))
+                self._follow(piece, recent[0], unseen.t, self._fastest)  # it came to it unseen
+            for sample in recent[-_LATE:] if at is None else recent[at:]:
                 self._follow(piece, sample, sample.t, self._fastest)
             if piece.off is not None:  # it may have come to it since, or it cannot
                 since, back = piece.off
@@ -220,8 +222,6 @@ class PieceCoverage:
             last = self._recent[-1] if self._recent and sample.t > before else None
             self._forget_recent()
             self._unseen_since = last
-        elif len(self._recent) == _RECENT:
-            self._unseen_since = None
         self._recent.append(sample)
         for name in {self._under_way, self._ending, *self._restored}:
             piece = self._pieces.get(name or '')
