@@ -366,3 +366,22 @@ def test_a_strip_whose_begin_is_known_late_is_flown_once(kind, silence, late):
     assert bench.run(lambda: len(bench.completed()) == 3, 300.0)
     for each in strips:
         assert set(track.times_flown(each)) == {1}
+
+
+def test_a_strip_along_which_the_vehicle_was_held_unseen_is_flown_from_its_first_point():
+    line, unseen = piece('L', (0, 60), (200, 60)), [False]
+    west, other = piece('W', (-300, 60), (-150, 60)), piece('X', (0, 260), (60, 260))
+    bench, track = surveying('ardupilot', list_of(west, line, other), delay=(0.1, 0.1))
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        unseen[0] and m.get_type() == 'GLOBAL_POSITION_INT') else None)
+    body = bench.vehicles[1].flight.body
+    assert bench.run(lambda: bench.completed() == ['W'] and body.position[0] > -8.0)
+    unseen[0] = True
+    assert bench.run(lambda: bench.onboard().progress.coverage.latest == 'L')
+    bench.run(limit=1.0)
+    bench.assign(list_of(line, piece('M', (200, 160), (0, 160)), other, revision=2))
+    bench.run(limit=1.5)
+    unseen[0] = False
+    assert bench.run(lambda: set(bench.completed()) == {'W', 'L', 'M', 'X'}, 300.0)
+    assert not [note for note in bench.notes if 'was not flown' in note]
+    assert track.times_flown(line)[-1] == 1

@@ -6,7 +6,7 @@ import random
 from collections import deque
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.autopilots import Profile
+from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.resume import Resume
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_failures import UploadFailures
@@ -122,7 +122,11 @@ class OnboardMission:
     def diff(self) -> MissionDiff:
         """What to change on board so that the list is flown; requires a known mission."""
         assert self.held is not None
-        wanted, current = self.wanted(), self.progress.current
+        wanted, current, telemetry = self.wanted(), self.progress.current, self._telemetry
+        held = telemetry.mode is ModeFunction.HOLD and telemetry.airborne
+        if held and telemetry.has_position and self.progress.coverage.must_begin(
+                self.progress.active, telemetry.position):
+            current = None  # it would fly on along a way from where it was held
         diff = self._latest_diff.of(self.held, current, wanted, self._done())
         if self.list.horizon.stops is not None and diff.kind is not DiffKind.KEEP:
             if self.list.has_enough(self.held):

@@ -90,6 +90,21 @@ class Piece:
             return math.dist(places[-1], first) < math.dist(places[-1], last)
         return math.dist(places[0], self.way[-2]) < math.dist(places[0], self.way[1])
 
+    def turn(self, path: tuple[Point, ...], backwards: bool) -> None:
+        """Take another direction of flight, or of the path.
+
+        Args:
+            path: the same points, perhaps from the other end.
+            backwards: whether it is flown from the last point of that path.
+        """
+        self.commit()
+        if self.path != path:
+            length = self.at[-1]
+            self.path, self.at = path, [length - at for at in reversed(self.at)]
+            self.low, self.high = length - self.high, length - self.low
+        self.reversed = backwards
+        self.measure()
+
     def commit(self) -> bool:
         """Leave out the flown part from now on; whether there is one."""
         if self.flown < _SHORTEST:

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much of the ways of a list is flown, by the positions of the vehicle in mission mode.
 
-A way is flown from one end without a break. It is complete once the vehicle has followed it to its
-last point; where it left it in between, the rest is flown from there.
+A way is complete once it was followed to its last point; where it was left, the rest is flown.
 """
 from __future__ import annotations
 
@@ -44,13 +43,14 @@ class PieceCoverage:
 
     Attributes:
         version: changes with the ways that are left.
+        corridor: distance [m] from a way at which the vehicle still follows it.
         mission_known: whether the mission on board is known, so that what is flown in silence is.
         recorded: what was flown before this run of the bridge was stored.
     """
 
     def __init__(self, plane: bool = False) -> None:
         self.version, self.mission_known = 0, True
-        self._corridor = _CORRIDOR_PLANE if plane else _CORRIDOR
+        self.corridor = _CORRIDOR_PLANE if plane else _CORRIDOR
         self._pieces: dict[str, Piece] = {}
         self.left: deque[str] = deque(maxlen=_KEPT)  # ways that were left, to be taken
         self._partly: dict[str, None] = {}  # those of which a part is flown
@@ -93,13 +93,7 @@ class PieceCoverage:
 
     def _turn(self, piece: Piece, path: tuple[Point, ...], backwards: bool) -> None:
         """Take another direction of flight, or of the path."""
-        piece.commit()
-        if piece.path != path:  # the same points from the other end
-            length = piece.at[-1]
-            piece.path, piece.at = path, [length - at for at in reversed(piece.at)]
-            piece.low, piece.high = length - piece.high, length - piece.low
-        piece.reversed = backwards
-        piece.measure()
+        piece.turn(path, backwards)
         self.version += 1
 
     def rest(self, stop: MissionStop) -> MissionStop:
@@ -125,10 +119,20 @@ class PieceCoverage:
         """The task whose way the vehicle is on, or has left without flying to another one."""
         return self._latest
 
-    @property
-    def corridor(self) -> float:
-        """Distance from a way at which the vehicle still follows it [m]."""
-        return self._corridor
+    def must_begin(self, item: Item | None, place: Point) -> bool:
+        """Whether a way has to be flown from its first point: nothing of it is known to be flown.
+
+        Args:
+            item: that the vehicle would fly on to.
+            place: of the vehicle [m] ENU.
+
+        Returns:
+            True where the item is of such a way, and the vehicle is not at its first point.
+        """
+        piece = self._pieces.get(item.task) if item is not None and item.along else None
+        return piece is not None and piece.flown < _SHORTEST and (
+            piece.high - piece.low >= piece.at[-1] - 1e-6
+            and math.dist(place, piece.way[0]) > self.corridor + _SLACK)
 
     def is_followed(self, stop: MissionStop) -> bool:
         """Whether the vehicle is flying along the way of a stop, in the direction of the stop."""
@@ -178,7 +182,7 @@ class PieceCoverage:
         if piece.seen is None:
             recent, begin, unseen = list(self._recent), piece.next_point(), self._unseen_since
             at = next((n for n in reversed(range(len(recent))) if math.dist(
-                recent[n].position, begin) <= self._corridor), None)
+                recent[n].position, begin) <= self.corridor), None)
             if at is None and unseen is not None and 0 < len(recent) <= _LATE:
                 piece.seen, piece.off = unseen.t, (unseen.t, math.dist(unseen.position, begin))
                 self._follow(piece, recent[0], unseen.t, self._fastest)  # it came to it unseen
@@ -186,7 +190,7 @@ class PieceCoverage:
                 self._follow(piece, sample, sample.t, self._fastest)
             if piece.off is not None:  # it may have come to it since, or it cannot
                 since, back = piece.off
-                piece.missed = back > self._corridor + _SLACK + (
+                piece.missed = back > self.corridor + _SLACK + (
                     _MARGIN * self._fastest * max(vehicle_now() - since, 0.0))
 
     def note_replaced(self, item: Item | None) -> None:
@@ -259,7 +263,7 @@ class PieceCoverage:
         low, high = piece.flown - _SLACK, piece.flown + reach
         first = max(bisect_right(piece.way_at, low) - 1, 0)
         last = min(bisect_left(piece.way_at, high), len(piece.way) - 1)
-        best, found = self._corridor, None
+        best, found = self.corridor, None
         for n in range(first, last):
             a, b = piece.way[n], piece.way[n + 1]
             away = math.dist(position, nearest_on_segment(position, a, b))
@@ -281,13 +285,13 @@ class PieceCoverage:
         if piece is None or math.isinf(self._sampled):
             return True
         left = piece.way_at[-1] - piece.flown
-        if left <= self._corridor + _SLACK or piece.in_silence:
+        if left <= self.corridor + _SLACK or piece.in_silence:
             return True
         # nothing was received since it was on its way
         blind = self.mission_known and piece.seen is not None and (
             self._sampled <= piece.seen and not piece.missed and not piece.gone)
         left += piece.off[1] if piece.off is not None else 0.0
-        return blind and left <= _SLACK + self._corridor + _MARGIN * fastest * max(
+        return blind and left <= _SLACK + self.corridor + _MARGIN * fastest * max(
             0.0, vehicle_now - (piece.seen or 0.0))
 
     def covered_before(self, task: str) -> bool:
@@ -301,7 +305,7 @@ class PieceCoverage:
         """
         piece = self._pieces.get(task)
         return piece is None or piece.in_silence or (
-            piece.way_at[-1] - piece.flown <= self._corridor + _SLACK)
+            piece.way_at[-1] - piece.flown <= self.corridor + _SLACK)
 
     def forget(self, task: str) -> None:
         """Fly the whole way of a task again."""
@@ -392,5 +396,5 @@ class PieceCoverage:
         n = min(range(1, len(piece.way)), key=lambda k: math.dist(piece.way[k], place))
         piece.flown = piece.way_at[n - 1]
         # set by another station, it flies to the item from elsewhere
-        if sample is not None and piece.begun_by(sample, n - 1) <= self._corridor:
+        if sample is not None and piece.begun_by(sample, n - 1) <= self.corridor:
             self._place(piece, sample.position, sample.t)
