@@ -5,7 +5,7 @@ import math
 
 import pytest
 from authority_bench import MODES
-from findings_bench import listed
+from findings_bench import drop_messages, listed
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 
@@ -176,11 +176,6 @@ def announce(bench, zone):
     bench.executor().policy = dataclasses.replace(bench.executor().policy, zones=(zone,))
 
 
-def lose_items(bench, while_true):
-    bench.line.tampers.append(lambda direction, m, now: [] if (
-        direction == 'up' and m.get_type() == 'MISSION_ITEM_INT' and while_true()) else None)
-
-
 @BOTH
 def test_a_vehicle_holds_before_a_new_zone_until_it_has_the_list_around_it(kind):
     bench, zone = FlightBench(kind).discover(), ThreatZone.cylinder('farm', (0.0, 250.0), 20.0)
@@ -188,7 +183,7 @@ def test_a_vehicle_holds_before_a_new_zone_until_it_has_the_list_around_it(kind)
     bench.assign(listed(1, A=(0.0, 400.0)))
     assert bench.run(lambda: bench.state().position[1] > 60.0)
     stalled = [True]
-    lose_items(bench, lambda: stalled[0])
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT', lambda m: stalled[0])
     announce(bench, zone)
     bench.assign(listed(2, B=(80.0, 250.0), A=(0.0, 400.0)))
     assert bench.run(lambda: is_held(bench), 60.0)
@@ -215,7 +210,8 @@ def test_px4_does_not_take_a_list_to_whose_first_task_a_zone_is_now_between():
     bench.assign(listed(1, A=(300.0, 0.0)))
     announce(bench, zone)
     assert bench.run(lambda: bench.state().position[0] > 20.0)
-    lose_items(bench, lambda: bench.vehicles[1].flight.body.position[0] < 180.0)
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT',
+                  lambda m: bench.vehicles[1].flight.body.position[0] < 180.0)
     bench.assign(listed(2, T=(0.0, 300.0), U=(0.0, 400.0)))
     assert bench.run(lambda: bench.completed() == ['T', 'U'], 200.0)
     assert least[0] > zone.radius

@@ -19,7 +19,7 @@ from uav_task_alloc.mavlink.mission.item import Item
 from uav_task_alloc.model import Point, ThreatZone
 
 _REACTION = 0.5  # [s] from a position until a hold takes effect
-_BRAKING = 2.0  # [m/s^2], the least with which copters come to a halt
+_BRAKING = 2.0  # [m/s^2], less than the defaults of WPNAV_ACCEL (2.5) and MPC_ACC_HOR (3)
 _SPARE = 10.0  # [m]
 _FREE = 300.0  # [m] of its way that is clear before a hold at a zone ends
 
