@@ -3,6 +3,7 @@
 import math
 from itertools import pairwise
 
+from flight_bench import FlightBench
 from mission_bench import ORIGIN
 
 from uav_task_alloc.actions import Action
@@ -103,3 +104,18 @@ def stored_points(bench, n=1):
     """ENU positions of the items on board [m], home left out."""
     return [to_enu(ORIGIN, i.x * 1e-7, i.y * 1e-7, i.z) for i in bench.vehicles[n].mission.items
             if i.x]
+
+
+def surveying(kind, tasks, **kwargs):
+    """A vehicle with a list, its track recorded."""
+    bench = FlightBench(kind, **kwargs).discover()
+    track = Track(bench)
+    bench.assign(tasks)
+    return bench, track
+
+
+def halfway(bench, task, metres=100.0):
+    """Fly until the vehicle is that far along a strip that is flown to the east."""
+    body = bench.vehicles[1].flight.body
+    assert bench.run(lambda: math.dist(body.position[1:], task.path[0][1:]) < 2.0
+                     and body.position[0] >= metres, 200.0)

@@ -347,7 +347,7 @@ def test_no_upload_begins_while_a_repeated_command_of_mission_mode_may_still_arr
 
 
 @pytest.mark.parametrize(('before', 'reported', 'sent_again'), [
-    (0, 2, False), (0, 1, False), (0, 0, True), (2, 2, True)])
+    (0, 2, False), (0, 1, False), (0, 0, True), (1, 2, False), (2, 2, True)])
 def test_a_set_current_is_not_sent_again_once_a_later_item_is_reported(
         before, reported, sent_again):
     executor, done = flying('px4', 'ABCD').executor(), []

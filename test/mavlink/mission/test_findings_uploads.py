@@ -240,7 +240,7 @@ def items_at(**places):
 
 def upload_during(flight, **places):
     """Reports that are kept while another mission may be on board, and that mission."""
-    return ReportsDuringUpload(flight.table, ORIGIN), MissionDiff(
+    return ReportsDuringUpload(flight.table, ORIGIN, True), MissionDiff(
         DiffKind.REPLACE, items_at(**places), 0)
 
 

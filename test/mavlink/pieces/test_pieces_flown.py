@@ -6,20 +6,22 @@ from itertools import pairwise
 
 import pytest
 from flight_bench import FlightBench, Store
-from piece_bench import Track, list_of, payload, photos, pictures_of, piece, strip
+from piece_bench import (
+    Track,
+    halfway,
+    list_of,
+    payload,
+    photos,
+    pictures_of,
+    piece,
+    strip,
+    surveying,
+)
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
-
-
-def surveying(kind, tasks, **kwargs):
-    """A vehicle with a list, its track recorded."""
-    bench = FlightBench(kind, **kwargs).discover()
-    track = Track(bench)
-    bench.assign(tasks)
-    return bench, track
 
 
 @BOTH
@@ -63,13 +65,6 @@ def test_nothing_is_left_running_after_the_last_strip(kind):
     bench, _ = surveying(kind, list_of(strip(0), strip(1)))
     assert bench.run(lambda: len(bench.completed()) == 2, 300.0)
     assert payload(bench) == [('trigger', '20'), ('trigger', '0')] * 2
-
-
-def halfway(bench, task, metres=100.0):
-    """Fly until the vehicle is that far along a strip that is flown to the east."""
-    body = bench.vehicles[1].flight.body
-    assert bench.run(lambda: math.dist(body.position[1:], task.path[0][1:]) < 2.0
-                     and body.position[0] >= metres, 200.0)
 
 
 def set_mode(bench, mode):
@@ -247,24 +242,6 @@ def test_a_wait_before_a_way_is_kept_and_the_way_flown_once(kind, waiting):
         assert max(b - a for a, b in pairwise(pictures_of(bench, each))) <= 23.0
 
 
-def test_a_way_left_in_silence_for_a_list_that_is_not_confirmed_is_flown_later():
-    line = piece('L', (0, 60), (200, 60))
-    other = piece('M', (150, 80), (300, 80))
-    bench, track = surveying('px4', list_of(line, other))
-    halfway(bench, line, 20.0)
-    bench.line.tampers.append(lambda direction, m, now: [] if (
-        direction == 'down' and m.get_type() == 'MISSION_ACK') else None)
-    bench.assign(list_of(other, line, revision=2))
-    assert bench.run(lambda: bench.onboard().upload.may_be_stored, 10.0)
-    bench.run(limit=0.3)
-    bench.line.cut = True
-    bench.run(limit=14.0)
-    bench.line.cut = False
-    bench.line.tampers.clear()
-    assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
-    assert min(track.times_flown(line)) == 1
-
-
 @BOTH
 @pytest.mark.parametrize(('store', 'early'), [
     (True, True), (True, False), (False, True), (False, False)])
@@ -320,20 +297,6 @@ def test_a_strip_that_ends_while_no_bridge_runs_is_flown_once(kind):
         assert set(track.times_flown(each)) == {1}
 
 
-def test_a_way_left_in_silence_for_another_list_is_flown_later():
-    line = piece('L', (0, 60), (200, 60))
-    other = piece('M', (150, 80), (300, 80))
-    bench, track = surveying('px4', list_of(line, other))
-    halfway(bench, line, 20.0)
-    bench.assign(list_of(other, line, revision=2))
-    assert bench.run(lambda: bench.onboard().verified(), 20.0)
-    bench.line.cut = True
-    bench.run(limit=14.0)
-    bench.line.cut = False
-    assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
-    assert min(track.times_flown(line)) == 1
-
-
 @pytest.mark.parametrize('turned_at', [2.0, 30.0])  # [s] before its way is begun, and on it
 @pytest.mark.parametrize('closed', [False, True])
 def test_a_way_that_a_list_turns_during_a_long_upload_counts_as_it_is_flown(turned_at, closed):
@@ -349,39 +312,3 @@ def test_a_way_that_a_list_turns_during_a_long_upload_counts_as_it_is_flown(turn
     assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
     bench.run(limit=10.0)
     assert [bench.flown().count(point) for point in line.path[1:-1]] == [1] * (2 + closed)
-
-
-@BOTH
-@pytest.mark.parametrize(('silence', 'late'), [(6.0, 6.0), (6.0, 6.5), (0.0, 16.0)])
-def test_a_strip_whose_begin_is_known_late_is_flown_once(kind, silence, late):
-    strips, lost = [strip(k, actions=()) for k in range(3)], {}
-    bench, track = surveying(kind, list_of(*strips, turned=('F#1',)))
-    bench.line.tampers.append(lambda direction, m, now: [] if direction == 'down' and (
-        now < lost.get(m.get_type(), -math.inf)) else None)
-    assert bench.run(lambda: bench.completed() == ['F#0'])
-    x, y, _ = strips[1].path[-1]
-    assert bench.run(lambda: math.dist(bench.vehicles[1].flight.body.position[:2], (x, y)) < 25.0)
-    lost['GLOBAL_POSITION_INT'] = bench.now + silence
-    lost['MISSION_CURRENT'] = lost['MISSION_ITEM_REACHED'] = bench.now + late
-    assert bench.run(lambda: len(bench.completed()) == 3, 300.0)
-    for each in strips:
-        assert set(track.times_flown(each)) == {1}
-
-
-def test_a_strip_along_which_the_vehicle_was_held_unseen_is_flown_from_its_first_point():
-    line, unseen = piece('L', (0, 60), (200, 60)), [False]
-    west, other = piece('W', (-300, 60), (-150, 60)), piece('X', (0, 260), (60, 260))
-    bench, track = surveying('ardupilot', list_of(west, line, other), delay=(0.1, 0.1))
-    bench.line.tampers.append(lambda direction, m, now: [] if (
-        unseen[0] and m.get_type() == 'GLOBAL_POSITION_INT') else None)
-    body = bench.vehicles[1].flight.body
-    assert bench.run(lambda: bench.completed() == ['W'] and body.position[0] > -8.0)
-    unseen[0] = True
-    assert bench.run(lambda: bench.onboard().progress.coverage.latest == 'L')
-    bench.run(limit=1.0)
-    bench.assign(list_of(line, piece('M', (200, 160), (0, 160)), other, revision=2))
-    bench.run(limit=1.5)
-    unseen[0] = False
-    assert bench.run(lambda: set(bench.completed()) == {'W', 'L', 'M', 'X'}, 300.0)
-    assert not [note for note in bench.notes if 'was not flown' in note]
-    assert track.times_flown(line)[-1] == 1

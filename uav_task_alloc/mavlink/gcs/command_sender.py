@@ -218,7 +218,7 @@ class CommandSender:
                 return False
             # points of a way may be passed faster than they are reported
             return telemetry.current == seq or (
-                before is not None and before < seq < telemetry.current)
+                before is not None and before <= seq < telemetry.current)
 
         message = Command(_SET_CURRENT, self._peer.set_current(seq), executed)
         command = Command(_SET_CURRENT, self._peer.command(

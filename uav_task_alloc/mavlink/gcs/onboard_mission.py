@@ -59,7 +59,7 @@ class OnboardMission:
         self.set_current_to: int | None = None  # seq to set, unless the upload has set it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._at_start: object = None  # of the upload: tasks done, detour points left out
-        self._reports = ReportsDuringUpload(self.progress, origin)
+        self._reports = ReportsDuringUpload(self.progress, origin, profile.atomic)
         self.mission, self._latest_diff = VerifiedMission(self.own, profile.atomic), LatestDiff()
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list

@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.mission.diff import MissionDiff
+from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
 from uav_task_alloc.mavlink.mission.items import Item, alike, with_position
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
@@ -56,6 +56,7 @@ class ReportsDuringUpload:
     Args:
         progress: where they are credited.
         origin: of the ENU frame of the mission items.
+        atomic: the vehicle flies the old mission until it has all items of the new one (PX4).
 
     Attributes:
         sent_since: vehicle time [s] before which the new mission was not on board; None: it is
@@ -71,8 +72,8 @@ class ReportsDuringUpload:
         uploaded: the new mission; None: none is open.
     """
 
-    def __init__(self, progress: ProgressTable, origin: Origin) -> None:
-        self._progress, self._origin = progress, origin
+    def __init__(self, progress: ProgressTable, origin: Origin, atomic: bool) -> None:
+        self._progress, self._origin, self._atomic = progress, origin, atomic
         self._reached: list[_Reached] = []
         self._currents: list[_Current] = []
         self._judged: set[tuple[int, int]] = set()  # first and last frame of series credited early
@@ -89,6 +90,7 @@ class ReportsDuringUpload:
     def note_sent(self, frame: int) -> None:
         """Note that the new mission was sent to its end, and may be on board from now on."""
         self.sent_since, self.sent_frame = self._progress.path.newest, frame
+        self._progress.coverage.mission_known = False
 
     def add_reached(self, seq: int, now: float, frame: int) -> None:
         """Keep a REACHED that may be of the old or of the new mission."""
@@ -283,7 +285,8 @@ class ReportsDuringUpload:
 
         A readback may take long, and a bridge that is killed meanwhile would lose it.
         """
-        self._progress.coverage.mission_known = uploaded is None
+        self._progress.coverage.mission_known = uploaded is None or (
+            uploaded.kind is DiffKind.APPEND or (self._atomic and self.sent_since is None))
         waiting = [each for each in self._reached if (each.frame, each.last_frame)
                    not in self._judged and now - self._first_at(each) >= MAX_MESSAGE_DELAY]
         if waiting and uploaded is not None:
