@@ -346,19 +346,6 @@ def test_no_upload_begins_while_a_repeated_command_of_mission_mode_may_still_arr
     assert len(modes) == 2
 
 
-@pytest.mark.parametrize(('before', 'reported', 'sent_again'), [
-    (0, 2, False), (0, 1, False), (0, 0, True), (1, 2, False), (2, 2, True)])
-def test_a_set_current_is_not_sent_again_once_a_later_item_is_reported(
-        before, reported, sent_again):
-    executor, done = flying('px4', 'ABCD').executor(), []
-    telemetry, sender = executor.telemetry, executor.sender
-    telemetry.current = before
-    assert sender.set_current(1, 100.0, done.append)
-    telemetry.current, telemetry.current_at = reported, 100.5
-    assert bool(sender.finish(101.5)) is sent_again
-    assert bool(done) is not sent_again
-
-
 @pytest.mark.parametrize(('x', 'speed', 'flown'), [
     (88.0, -0.1, False),  # set to the next item before it was there, it turns around
     (88.0, 3.0, False),

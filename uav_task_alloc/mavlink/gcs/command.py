@@ -47,8 +47,13 @@ class Command:
     _due: float = float('-inf')
     _sent: int = 0
 
-    def step(self, now: float) -> list[Message]:
-        """The message if it is due; `now`: steady time [s]."""
+    def step(self, now: float, may_repeat: bool = True) -> list[Message]:
+        """Return the message if it is due.
+
+        Args:
+            now: steady time [s].
+            may_repeat: whether it may be sent once more.
+        """
         if self.result is not CommandResult.OPEN:
             return []
         if not self.wanted():
@@ -56,7 +61,7 @@ class Command:
             return []
         if self._sent and self.executed():
             self.result = CommandResult.DONE
-        elif now >= self._due:
+        elif now >= self._due and (may_repeat or not self._sent):
             if self._sent < self.attempts:
                 self._sent += 1
                 self._due = now + _PERIOD

@@ -53,6 +53,7 @@ class CommandSender:
         self.current_set_at: dict[int, float] = {}
         self._seq = 0  # of the latest of these commands
         self.mission_repeated_at = -math.inf  # [s] the command of mission mode was sent again
+        self._reads = False  # a message was processed since the open command was continued last
         self._command: Command | None = None
         self._completion: _Completion | None = None
         self._climb_until = math.inf
@@ -128,6 +129,7 @@ class CommandSender:
 
     def receive(self, message: Message) -> None:
         """Process a COMMAND_ACK; one to another station is ignored."""
+        self._reads = True
         if self._command and self._peer.is_from_vehicle(message):
             self._command.receive(message)
 
@@ -142,7 +144,8 @@ class CommandSender:
         command = self._command
         if command is None:
             return None
-        out = command.step(now)
+        # the answer may be among the messages that were received in a stall, and come next
+        out, self._reads = command.step(now, may_repeat=not self._reads), False
         if out and command.name == _SET_CURRENT:
             self.current_set_at[self._seq] = now
         elif out and command.name == _mode_name(ModeFunction.MISSION):
@@ -211,14 +214,15 @@ class CommandSender:
             completion: called once MISSION_CURRENT confirms it.
         """
         telemetry, sent_at, before = self._telemetry, now, self._telemetry.current
+        plan = telemetry.plan_id
         self._seq, self.current_set_at[seq] = seq, now
 
         def executed() -> bool:
             if telemetry.current is None or telemetry.current_at < sent_at:
                 return False
-            # points of a way may be passed faster than they are reported
-            return telemetry.current == seq or (
-                before is not None and before <= seq < telemetry.current)
+            # points may be passed faster than they are reported; `before` is of its own plan
+            return telemetry.current == seq or (before is not None and seq < telemetry.current
+                                                and (before <= seq or telemetry.plan_id != plan))
 
         message = Command(_SET_CURRENT, self._peer.set_current(seq), executed)
         command = Command(_SET_CURRENT, self._peer.command(

@@ -241,7 +241,8 @@ class OnboardMission:
         """
         seq, frame = max(0, message.seq - self.own), self._telemetry.frame
         if not self.open or self._appends or not (flying or self._profile.atomic):
-            self._reports.note_passed(seq, now, frame, is_current=True, flying=flying)
+            self._reports.note_passed(seq, now, frame, is_current=True, flying=flying,
+                                      of_taken=self.mission.is_taken(message))
             return True  # ArduPilot's current item stays that of the old mission until it flies
         if self.mission.has_mission_id(message):
             self._reports.release(self._telemetry.frame)

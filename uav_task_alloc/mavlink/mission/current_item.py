@@ -38,7 +38,7 @@ class CurrentItem:
     def __init__(self, epoch: Epoch, tasks: CompletedTasks, positions: PositionHistory,
                  epochs: ReachedEpoch, frames: FrameLog) -> None:
         self._epoch, self._tasks, self._positions = epoch, tasks, positions
-        self._epochs = epochs
+        self._epochs, self._frames = epochs, frames
         self.passed = PassedItems(frames, positions)
         self.reports = CurrentItemReports()
         self.skipped: deque[str] = deque()  # tasks skipped by another station
@@ -92,7 +92,7 @@ class CurrentItem:
 
     def note_set(self, seq: int, now: float) -> None:
         """Note that we have set the current item: the items skipped by that were not flown."""
-        self.reports.note_set(seq, now)
+        self.reports.note_set(seq, now, self._frames.newest)
         self.set_by_other = None
         self._epoch.current, self._epoch.since = seq, self._positions.path.newest
 
@@ -170,7 +170,7 @@ class CurrentItem:
         """
         reports, epoch = self.reports, self._epoch
         reports.previous_frame = reports.last_frame
-        if not reports.is_old(seq, now):
+        if not reports.is_old(seq, now, frame):
             self._move(seq, now, flying, frame)
         reports.note(seq, frame)
         known = None if not flying or epoch.current is None else (

@@ -2,9 +2,12 @@
 """Separates MISSION_CURRENT sent before our set-current command from those sent after it."""
 from __future__ import annotations
 
+import math
+
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 
 SETTLE_TIME = 3.0  # [s] in which a MISSION_CURRENT sent before a change may still arrive
+_ID_LEADS = 0.5  # [s] by which PX4 may report the id of a mission before its current item
 
 
 class CurrentItemReports:
@@ -20,6 +23,7 @@ class CurrentItemReports:
         self.previous_frame: int | None = None  # number of the one before
         self._earlier: tuple[int, float] | None = None  # an item before ours, reported since [s]
         self._set: tuple[int, float] | None = None  # by us at a time [s], not confirmed yet
+        self._set_frame = math.inf  # frames after this number were sent after that
         self._setting: int | None = None  # set-current sent, not acknowledged yet
 
     @property
@@ -29,7 +33,7 @@ class CurrentItemReports:
 
     def begin(self, start: int | None, now: float) -> None:
         """Start a new epoch at an item that the vehicle will report; None: not known."""
-        self._set = None if start is None else (start, now)
+        self._set, self._set_frame = None if start is None else (start, now), math.inf
         self._setting = self.reported = None
         self.went_back = False
 
@@ -42,20 +46,43 @@ class CurrentItemReports:
         """Note that a set-current command is about to be sent."""
         self._setting = seq
 
-    def note_set(self, seq: int, now: float) -> None:
-        """Note that the set-current command was acknowledged."""
-        self._set, self._setting, self.went_back = (seq, now), None, False
+    def note_set(self, seq: int, now: float, frame: int) -> None:
+        """Note that the set-current command was executed.
 
-    def is_old(self, seq: int, now: float) -> bool:
+        Args:
+            seq: index without home.
+            now: [s].
+            frame: number of the newest frame, which shows it or came later.
+        """
+        self._set, self._setting, self.went_back = (seq, now), None, False
+        self._set_frame = frame
+
+    def note_id(self, frame: int, now: float) -> None:
+        """Note a report with PX4's id of the mission that it has taken: later ones are of it.
+
+        Args:
+            frame: its number.
+            now: [s].
+        """
+        if self._set is not None and now - self._set[1] >= _ID_LEADS:
+            self._set_frame = min(self._set_frame, frame - 1)
+
+    def is_old(self, seq: int, now: float, frame: int | None) -> bool:
         """Whether a report is older than our set-current, or reports the item being set.
 
         A newer report ends the wait for the confirmation.
+
+        Args:
+            seq: the reported current item.
+            now: [s].
+            frame: number of its frame; None: not known.
         """
         if seq == self._setting:
             return True
         if self._set is not None:
             start, when = self._set
-            if seq != start and (seq < start or now - when < SETTLE_TIME):
+            later = frame is not None and frame > self._set_frame
+            if seq != start and (seq < start or (now - when < SETTLE_TIME and not later)):
                 return True
             self._set = None
         return False

@@ -108,13 +108,16 @@ class ReportsDuringUpload:
             self._currents.append(_Current(seq, now, frame, flying, plan))
 
     def note_passed(self, seq: int, now: float, frame: int, is_current: bool,
-                    flying: bool = True) -> None:
-        """Keep a report that was passed on, until the mission taken is read back.
+                    flying: bool = True, of_taken: bool = False) -> None:
+        """Keep a report that is passed on, until the mission taken is read back.
 
         Args:
             seq, now, frame, flying: see above.
             is_current: a MISSION_CURRENT, not a MISSION_ITEM_REACHED.
+            of_taken: it has PX4's id of the mission taken.
         """
+        if of_taken:
+            self._progress.reports.note_id(frame, now)
         if self._passed is not None and len(self._passed) < _MAX_CURRENT:
             self._passed.append(_Passed(frame, is_current, seq, now, flying))
 

@@ -64,6 +64,10 @@ class VerifiedMission:
         """Whether a MISSION_CURRENT refers to this mission, by PX4's mission id."""
         return self._mission_id != 0 and plan_id(message) == self._mission_id
 
+    def is_taken(self, message: Message) -> bool:
+        """Whether a MISSION_CURRENT refers to the mission taken last, by PX4's mission id."""
+        return self.reported_id != 0 and plan_id(message) == self.reported_id
+
     def verify(self, items: tuple[Item, ...], now: float) -> None:
         """Note that these items are on board after our upload."""
         self.items, self.verified_at, self._mission_id = items, now, self.reported_id

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A current item that we set: when it is sent again, and which reports are of before it."""
+import pytest
+from findings_bench import flying
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
+
+
+@pytest.mark.parametrize(('before', 'reported', 'plan', 'sent_again'), [
+    (0, 2, 7, False), (0, 1, 7, False), (0, 0, 7, True), (1, 2, 7, False), (2, 2, 7, True),
+    (2, 2, 8, False), (2, 0, 8, True)])  # the item before was one of another mission
+def test_a_set_current_is_not_sent_again_once_a_later_item_is_reported(
+        before, reported, plan, sent_again):
+    executor, done = flying('px4', 'ABCD').executor(), []
+    telemetry, sender = executor.telemetry, executor.sender
+    telemetry.current, telemetry.plan_id = before, 7
+    assert sender.set_current(1, 100.0, done.append)
+    telemetry.current, telemetry.current_at, telemetry.plan_id = reported, 100.5, plan
+    assert bool(sender.finish(101.5)) is sent_again
+    assert bool(done) is not sent_again
+
+
+def test_a_command_is_repeated_only_after_all_messages_of_a_stall():
+    executor, done = flying('px4', 'ABCD').executor(), []
+    telemetry, sender = executor.telemetry, executor.sender
+    telemetry.current = 0
+    assert sender.set_current(2, 100.0, done.append)
+    sender.receive(d.MAVLink_system_time_message(0, 0))  # one that came before the answer
+    assert sender.finish(101.5) == []
+    assert sender.finish(101.52)
+    telemetry.current, telemetry.current_at = 2, 101.6
+    assert sender.finish(101.6) is None
+    assert done == [101.6]
+
+
+@pytest.mark.parametrize(('seq', 'frame', 'old'), [
+    (3, 41, False), (3, 40, True), (3, None, True), (2, 40, False), (1, 41, True)])
+def test_a_report_that_came_after_the_item_was_set_is_of_after_it(seq, frame, old):
+    reports = CurrentItemReports()
+    reports.begin(0, 100.0)
+    reports.note_set(2, 100.0, 40)
+    assert reports.is_old(seq, 101.0, frame) is old
+
+
+@pytest.mark.parametrize(('id_at', 'old'), [(100.2, True), (100.6, False)])
+def test_a_report_with_the_id_of_the_mission_taken_is_of_it(id_at, old):
+    reports = CurrentItemReports()
+    reports.begin(0, 100.0)
+    reports.note_id(50, id_at)
+    assert reports.is_old(3, id_at, 50) is old
