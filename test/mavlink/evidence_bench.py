@@ -42,10 +42,10 @@ class Flight:
     def fly_to(self, x):
         self.stay(abs(x - self.x) / SPEED, SPEED if x > self.x else -SPEED)
 
-    def begin(self, service=0.0, **tasks):
-        """Another mission is taken by the vehicle now: tasks by name, at x [m]."""
+    def begin(self, service=0.0, since=None, **tasks):
+        """Another mission is taken by the vehicle: tasks by name, at x [m]; since None: now."""
         stops = tuple(MissionStop(Task(name, (x, 0.0, 50.0), service_time=service))
                       for name, x in tasks.items())
         self.table.begin(mission_items(TaskList(1, stops), PX4_PROFILE.rules, ORIGIN), 0,
-                         self.now, since=self.now)
+                         self.now, since=self.now if since is None else since)
         self.table.note_mission_mode()

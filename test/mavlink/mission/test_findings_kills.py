@@ -11,7 +11,7 @@ from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReports
-from uav_task_alloc.mavlink.mission.flown_path import FlownPath
+from uav_task_alloc.mavlink.mission.flown_path import FlownPath, PositionSample
 from uav_task_alloc.mavlink.mission.item import Item
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
@@ -251,6 +251,12 @@ def test_a_reached_before_the_first_position_is_of_a_place_from_which_it_can_hav
     assert 'B' in bench.completed()
 
 
+def items_at(*places):
+    """A waypoint at each x [m]."""
+    return tuple(Item(d.MAV_CMD_NAV_WAYPOINT, d.MAV_FRAME_GLOBAL_INT, 0, 0, 50.0,
+                      position=(x, 0.0, 50.0), radius=2.0) for x in places)
+
+
 @pytest.mark.parametrize(('metres', 'seconds', 'after', 'known'), [
     (45.0, 4.0, 1, True),
     (75.0, 4.0, 1, False),  # too far for its speed
@@ -266,9 +272,7 @@ def test_a_position_of_long_after_a_reached_counts_where_the_current_items_agree
     reports.note_reached(0, 1.0, 2)
     reports.note_current(after, 1.5, 3, located=False)
     telemetry.has_position = True
-    item = Item(d.MAV_CMD_NAV_WAYPOINT, d.MAV_FRAME_GLOBAL_INT, 0, 0, 50.0,
-                position=(0.0, 0.0, 50.0), radius=2.0)
-    taken = reports.take_reached((item,) * 3, None, 1.0 + seconds)
+    taken = reports.take_reached(items_at(0.0, 0.0, 0.0), None, 1.0 + seconds)
     assert [each.seq for each in taken] == [0] * known
 
 
@@ -318,3 +322,51 @@ def test_a_task_reached_without_a_position_while_its_mission_is_not_read_is_know
     assert bench.completed() == []
     bench.vehicles[1].failsafe_over()
     assert bench.run(lambda: bench.completed() == ['A'], 10.0)
+
+
+def test_a_mission_taken_before_the_first_position_after_a_reboot_counts_by_its_new_clock():
+    flight = Flight()
+    flight.table.positions.add_recorded(PositionSample(500.0, (0.0, 0.0, 50.0), (0.0, 0.0, 0.0)))
+    flight.begin(since=500.0, A=100.0, B=900.0)  # by the clock of before the reboot
+    flight.fly_to(100.0)
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    flight.stay(0.2)
+    flight.begin(C=300.0, B=900.0)
+    flight.stay(0.4, SPEED)
+    flight.reached(0)  # repeated; the first one was lost
+    flight.stay(12.0, SPEED)
+    assert list(flight.table.completed) == ['A']
+
+
+def reports_of(place, repeats):
+    """Reports of a vehicle in mission mode that stands at a place."""
+    telemetry = SimpleNamespace(has_position=True, position=place, speed=0.0, in_mission=True,
+                                mission_state=d.MISSION_STATE_ACTIVE)
+    history = PositionHistory()
+    history.add(PositionSample(1.0, place, (0.0, 0.0, 0.0)), True, 1.0, 1)
+    return UnreadReports(telemetry, history, repeats)
+
+
+@pytest.mark.parametrize(('x', 'current', 'known'), [
+    (100.0, 1, True),
+    (110.0, 1, False),  # not at the item: a repetition of another mission
+    (100.0, 0, False)])  # another item was current
+def test_a_last_task_reached_just_before_the_mission_is_read_is_known(x, current, known):
+    reports = reports_of((x, 0.0, 50.0), repeats=True)
+    reports.note_current(current, 1.0, 2, located=False)
+    reports.note_reached(1, 2.0, 3)
+    taken = reports.take_reached(items_at(0.0, 100.0), None, 2.0)
+    assert [each.seq for each in taken] == [1] * known
+
+
+@pytest.mark.parametrize(('x', 'recorded', 'known'), [
+    (100.0, 1, True),
+    (130.0, 1, False),  # far from the item
+    (100.0, 0, False),  # another item was flown
+    (100.0, None, False)])
+def test_a_last_task_reached_before_a_reboot_and_a_restart_at_once_is_known(x, recorded, known):
+    reports = reports_of((x, 0.0, 50.0), repeats=False)
+    reports.note_reached(1, 1.2, 2)  # sent before the reboot
+    reports.note_current(0, 1.4, 3, located=False)
+    taken = reports.take_reached(items_at(0.0, 100.0), recorded, 2.0)
+    assert [each.seq for each in taken] == [1] * known

@@ -358,3 +358,17 @@ def test_a_vehicle_at_rest_in_the_middle_of_a_leg_has_not_come_from_its_start(x,
     path.add(PositionSample(18.0, (x, 0.0, 50.0), (speed, 0.0, 0.0)))
     assert path.could_have_flown(
         [(100.0, 0.0, 50.0)], (0.0, 0.0, 50.0), 0.0, 0.0) is flown
+
+
+@pytest.mark.parametrize(('x', 'speed', 'flown'), [
+    (93.0, -0.4, False),  # it sets out there: set to the next item before it was at 100 m
+    (90.0, -4.2, False),
+    (93.0, -5.0, True),
+    (96.5, -0.4, True)])
+def test_a_vehicle_that_sets_out_near_the_start_of_a_leg_has_not_come_from_it(x, speed, flown):
+    path = FlownPath()
+    path.add(PositionSample(0.0, (-50.0, 0.0, 50.0), (15.0, 0.0, 0.0)))
+    path.add(PositionSample(18.0, (x, 0.0, 50.0), (speed, 0.0, 0.0)))
+    path.add(PositionSample(18.5, (x + 0.5 * speed, 0.0, 50.0), (speed - 1.5, 0.0, 0.0)))
+    assert path.could_have_flown(
+        [(100.0, 0.0, 50.0)], (0.0, 0.0, 50.0), 0.0, 0.0) is flown

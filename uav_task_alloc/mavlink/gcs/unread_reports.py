@@ -146,7 +146,8 @@ class UnreadReports:
             placed, in_turn = each.place is not None and not each.late, self._is_in_turn(
                 each, recorded)
             if (self._is_of(each, held) and (placed or in_turn or each.place is None)) or (
-                    recorded is not None and not placed and in_turn):
+                    recorded is not None and not placed and in_turn) or (
+                    self._is_recorded(each, recorded, held)):
                 reached.append(each)
         self._reached.clear()
         return reached
@@ -188,8 +189,22 @@ class UnreadReports:
         return not self._repeats and known == reached.seq and any(
             each.flying and each.seq == reached.seq + (not each.complete) for each in after)
 
+    def _is_recorded(self, reached: UnreadReached, recorded: int | None,
+                     held: tuple[Item, ...]) -> bool:
+        """Whether it names the item that was flown last by the record, and was sent there.
+
+        It is sent once (ArduPilot); a restart of the vehicle since then sets the current item
+        back to the first.
+        """
+        return not self._repeats and recorded is not None and reached.place is not None and (
+            not reached.late and reached.seq == recorded < len(held)
+            and self._was_near(held[recorded], reached))
+
     def _is_of(self, reached: UnreadReached, held: tuple[Item, ...]) -> bool:
         """Whether a REACHED can be of the mission on board, by the current item and the place."""
+        before = [each.seq for each in self.currents if each.frame < reached.frame][-1:]
+        if self._repeats and reached.current_after is None and before == [len(held) - 1]:
+            reached.current_after = before[0]  # no item follows the last one
         if not reached.may_be_of(held, self._repeats):
             return False
         item = held[reached.seq]

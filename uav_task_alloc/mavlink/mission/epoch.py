@@ -65,3 +65,7 @@ class Epoch:
         """Forget the items: the mission on board is unknown."""
         self.items, self.current, self.started = (), None, None
         self.since = -math.inf
+
+    def restart_clock(self) -> None:
+        """Forget its times: they are of before a restart of the vehicle."""
+        self.since = self.begin = self.taken = -math.inf

@@ -29,6 +29,7 @@ _ACCELERATION = 6.0  # [m/s2] that no vehicle exceeds for seconds (PX4: MPC_ACC_
 _CORRIDOR = 8.0  # [m] from a leg at which a vehicle flies it
 _INSIDE = 2.5  # [m] from a leg on the inner side of the turn before it, where it cuts the corner
 _LEG_END = 10.0  # [m] from the ends of a leg where a vehicle may be at any speed
+_TURN = 5.0  # [m] of the next leg within which a vehicle that has come to its start turns
 _LEAST_ACCELERATION = 1.0  # [m/s2] with which a vehicle sets out on a leg, and ends it
 _LEAST_SHARE = 0.1  # of its highest speed of late, with which it flies the rest of a leg
 _HOLD_SLACK = 0.1  # [s] by which a sampled hold may be shorter than the real one
@@ -177,12 +178,13 @@ class FlownPath:
             True where a gap is long enough and the sample after it is of a vehicle that flies the
             following leg.
         """
-        fastest = self.fastest
-        for a, b in pairwise(self._since(since)):
+        fastest, samples = self.fastest, self._since(since)
+        for (a, b), c in zip(pairwise(samples), (*samples[2:], None), strict=False):
             if b.t - a.t > GAP and polyline_length((a.position, *chain, b.position)) <= (
                     _longest_way(a, b, 1.1 * fastest, b.t - a.t - 0.8 * holds)) + 10.0 and (
                     anywhere or (_on_leg(b.position, (a.position, *chain), then, home)
-                    and (home is not None or _moves_along(b, chain[-1], then, fastest)))):
+                    and (home is not None or (_moves_along(b, chain[-1], then, fastest)
+                    and not _turned_on_leg(b, c, chain[-1], then))))):
                 return True
         return False
 
@@ -271,6 +273,25 @@ def _moves_along(sample: PositionSample, start: Point, then: Point | None,
     free = min(flown, length - flown) - _LEG_END
     return free <= 0.0 or speed >= min(
         math.sqrt(2.0 * _LEAST_ACCELERATION * free), _LEAST_SHARE * fastest)
+
+
+def _turned_on_leg(sample: PositionSample, after: PositionSample | None, start: Point,
+                   then: Point | None) -> bool:
+    """Whether a vehicle that gathers speed along a leg set out from beyond the leg's start.
+
+    It turned around there before it came to the start.
+    """
+    length = 0.0 if then is None else math.dist(start, then)
+    if then is None or length == 0.0 or after is None or after.t - sample.t > GAP:
+        return False
+    along = [(q - p) / length for p, q in zip(start, then, strict=True)]
+    first, last = (math.fsum(v * k for v, k in zip(each.velocity, along, strict=True))
+                   for each in (sample, after))
+    gained = (last - first) / (after.t - sample.t)
+    if not (0.0 <= first < last and gained >= _LEAST_ACCELERATION):
+        return False  # or not known
+    flown = math.fsum((q - p) * k for p, q, k in zip(start, sample.position, along, strict=True))
+    return flown - first**2 / (2.0 * gained) > _TURN
 
 
 def _beside(point: Point, start: Point, end: Point) -> Point:

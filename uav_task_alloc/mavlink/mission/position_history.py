@@ -45,7 +45,7 @@ class PositionHistory:
 
     def add(
         self, sample: PositionSample, newest: bool, now: float, frame: int | None = None
-    ) -> None:
+    ) -> bool:
         """Add a position.
 
         Args:
@@ -53,9 +53,14 @@ class PositionHistory:
             newest: whether it did not arrive late.
             now: steady time [s].
             frame: number of its frame; None: not known.
+
+        Returns:
+            Whether the vehicle was restarted while no bridge ran: the path begins here.
         """
-        if self._recorded_at is not None and sample.t < self._recorded_at - MAX_MESSAGE_DELAY:
-            self.clear()  # the vehicle was restarted while no bridge ran
+        begins = self._recorded_at is not None and (
+            sample.t < self._recorded_at - MAX_MESSAGE_DELAY)
+        if begins:
+            self.clear()
         if not self._clocks or sample.t - now > self._clocks[-1][1]:
             self._clocks.append((now, sample.t - now))
             del self._clocks[:-_CLOCKS]
@@ -67,6 +72,7 @@ class PositionHistory:
                 self._invalid_until = now + (_FRESH if returns else _JUMP_RECOVERY)
             self.place = sample.position, now
         self.path.add(sample)
+        return begins
 
     def add_recorded(self, sample: PositionSample) -> None:
         """Add the last position that the previous run of the bridge has received.

@@ -235,7 +235,8 @@ class ProgressTable:
         self, sample: PositionSample, newest: bool, now: float, frame: int | None = None
     ) -> None:
         """Add a position of the vehicle; see `PositionHistory.add`."""
-        self.positions.add(sample, newest, now, frame)
+        if self.positions.add(sample, newest, now, frame):
+            self._epoch.restart_clock()
         self._note_active()
         if newest and not self.positions.invalid(now):
             self.coverage.add_position(sample, self.path.fastest)
