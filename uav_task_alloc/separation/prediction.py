@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -51,6 +51,19 @@ class PredictedLoss:
     horizontal: float  # [m] when they are nearest
     vertical: float  # [m] then
     share: float = 0.0  # of the distances that is kept: the greater of both shares, at the least
+
+
+def rule_to_go_on(rule: Separation) -> Separation:
+    """Return the rule by which the way of a UAV that holds is free.
+
+    Args:
+        rule: that is kept.
+
+    Returns:
+        The same with more distance and more time.
+    """
+    return replace(rule, horizontal=rule.horizontal * _CAUTION + _MARGIN,
+                   time=rule.time + _PATIENCE)
 
 
 class FlightPredictions:

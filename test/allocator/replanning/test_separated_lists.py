@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import pytest
 from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.core import make_safe_paths
@@ -236,17 +237,33 @@ def test_the_leg_after_a_take_off_that_has_begun_may_get_another_height():
     assert flight.legs[0].points == ((0.0, 0.0, 20.0), (0.0, 300.0, 50.0))
 
 
-def test_of_two_that_hold_for_each_other_one_gets_another_height_from_where_it_stands():
+def strip(name, *xs, uav, y=0.0):
+    return Task(name, (xs[0], y, 50.0), path=tuple((x, y, 50.0) for x in xs), allowed_uavs={uav})
+
+
+TO_POINTS = (Task('ta', (1500.0, 0.0, 50.0), allowed_uavs={'a'}),
+             Task('tb', (0.0, 0.0, 50.0), allowed_uavs={'b'}))
+TO_A_STRIP = strip('ta', 100.0, 1500.0, uav='a'), strip('tb', 0.0, -90.0, uav='b')
+PAST_A_STRIP = strip('ta', 100.0, 1500.0, uav='a'), strip('tb', 0.0, -90.0, uav='b', y=10.5)
+ON_STRIPS = strip('ta', 100.0, 1500.0, uav='a'), strip('tb', 1900.0, 0.0, uav='b')
+
+
+@pytest.mark.parametrize(('tasks', 'changed', 'holding'), [
+    (TO_POINTS, 'a', ['b']),  # until a has passed above it
+    (TO_A_STRIP, 'b', ['a']),  # which is on its path
+    (PAST_A_STRIP, 'b', ['a']),  # apart, but not by as much as the monitor wants
+    (ON_STRIPS, '', ['a', 'b'])])  # the paths keep their height
+def test_of_two_that_hold_for_each_other_one_gets_another_height_from_where_it_stands(
+        tasks, changed, holding):
     driver = AllocatorDriver(**ON)
     more = {'mode': 'ON_MISSION', 'authority': 'HELD', **SPEEDS}
 
     def report(a, b, speed):
         driver.uav('a', a, 0.0, 50.0, velocity=(speed, 0.0, 0.0), **more)
-        driver.uav('b', b, 0.0, 50.0, velocity=(-speed, 0.0, 0.0), **more)
+        driver.uav('b', b, tasks[1].position[1], 50.0, velocity=(-speed, 0.0, 0.0), **more)
 
     report(0.0, 2000.0, 10.0)
-    driver.add(Task('ta', (1500.0, 0.0, 50.0), allowed_uavs={'a'}),
-               Task('tb', (0.0, 0.0, 50.0), allowed_uavs={'b'}))
+    driver.add(*tasks)
     driver.settle(report=False)
     lists = driver.world.lists.lists
     for each in 'ab':
@@ -261,6 +278,6 @@ def test_of_two_that_hold_for_each_other_one_gets_another_height_from_where_it_s
         report(720.0, 760.0, 0.0)
         driver.core.separate(driver.now, driver.now)
         driver.settle(0.5, report=False)
-    vias = [stop.leg.via for each in 'ab' for stop in lists[each].stops]
-    assert sorted(map(len, vias)) == [0, 2], vias
-    assert [*driver.core.separation.monitor.holding] == ['b']  # until a has passed above it
+    assert {each: [len(stop.leg.via) for stop in lists[each].stops] for each in 'ab'} == {
+        each: [2 * (each == changed)] for each in 'ab'}
+    assert sorted(driver.core.separation.monitor.holding) == holding

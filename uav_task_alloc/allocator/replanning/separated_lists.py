@@ -14,6 +14,7 @@ from uav_task_alloc.allocator.state.flight_pace import UavFlight, slower_along, 
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.model import Leg, Point
+from uav_task_alloc.separation.prediction import rule_to_go_on
 from uav_task_alloc.separation.resolution import (
     STOPPED,
     Resolution,
@@ -51,13 +52,19 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
     params, tried, most = world.params, count(), _MOST_CHANGES
     if params.background_budget > 0.0:
         most = min(most, round(_CHANGES * params.solve_budget))
-    found = resolve(list(flights.values()), separation_of(params), TransitLimits(
+    limits = TransitLimits(
         params.altitude_min, params.altitude_max,
         lambda points: world.paths().leg_clear(*points), lambda: next(tried) >= most,
-        _DEAREST))
-    for before, after in zip(flights.values(), found.flights, strict=True):
-        if before is not after:
-            lists[after.uav] = _changed_list(world, lists[after.uav], before, after, stamp)
+        _DEAREST)
+    found = resolve(list(flights.values()), separation_of(params), limits)
+    changed = {each.uav: each for each in found.flights}
+    if _mover(world, lists):  # the monitor lets it go on where its way is free by more than that
+        held = [each for uav_id, each in changed.items() if uav_id in world.stuck]
+        changed |= {each.uav: each for each in resolve(
+            held, rule_to_go_on(separation_of(params)), limits).flights}
+    for uav_id, before in flights.items():
+        if changed[uav_id] is not before:
+            lists[uav_id] = _changed_list(world, lists[uav_id], before, changed[uav_id], stamp)
     return replace(built, lists=lists, together=_not_apart(found, flights))
 
 
@@ -125,10 +132,15 @@ def _mover(world: World, lists: Mapping[str, UavList]) -> str:
     """The first of the UAVs that hold for each other whose leg can change; '': there is none."""
     for uav_id in sorted(world.stuck & lists.keys()):
         record, stops = world.uav_record(uav_id), lists[uav_id].stops
-        if record and stops and not stops[0].task.path and (
+        if record and stops and not _is_on_path(record.report.position, stops[0]) and (
                 math.hypot(*(record.report.velocity or (0.0,))) < _RESTS):
             return uav_id
     return ''
+
+
+def _is_on_path(place: Point, stop: ListStop) -> bool:
+    """Whether a UAV at a place [m] is on the path of a stop, not on the leg to it."""
+    return bool(stop.task.path) and points_passed(place, stop.line) > len(stop.leg.via)
 
 
 def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
@@ -145,9 +157,9 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         takes_off = k == 0 and flight.on_ground
         under_way = k == 0 and _same_leg(published, stop) and not (
             flight.on_ground or flight.climbing or own.waits)
-        line = (*stop.leg.via, stop.entry)
-        ahead = stop.line[points_passed(place, stop.line):] if under_way else line
-        along = bool(stop.task.path) and not under_way  # the path is a leg of its own
+        along = bool(stop.task.path) and (stands or not under_way)  # the path is another leg
+        line = (*stop.leg.via, stop.entry) if along else stop.line
+        ahead = line[points_passed(place, line):] if under_way else line
         served = stop.served if under_way else 0.0
         begins = stop.begin_after - stamp
         climbs = takes_off or (k == 0 and flight.climbing)
