@@ -125,6 +125,17 @@ def test_labels_of_close_markers_do_not_overlap():
     assert not first.overlaps(second)
 
 
+def test_a_long_label_does_not_cover_a_marker_though_lines_are_beside_it():
+    axes = labels.Axes(space.Figure(figsize=(5.0, 5.0)), (0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(0.0, 100.0), ylim=(0.0, 100.0))
+    lines = [((x, 0.0), (x, 100.0)) for x in (30.0, 40.0, 45.0, 50.0)]
+    lines += [((50.0, y), (100.0, y)) for y in (47.0, 53.0)]
+    labels.place_labels(axes, [labels.Label('a long label of a place', 50.0, 50.0, 10.0, 5.0),
+                               labels.Label('b', 60.0, 50.0, 1.0, 4.0)], lines)
+    axes.figure.draw_without_rendering()
+    assert not axes.texts[0].get_window_extent().contains(*axes.transData.transform((60.0, 50.0)))
+
+
 # Machado, Oliveira and Fernandes 2009, "A Physiologically-based Model for Simulation of Color
 # Vision Deficiency", severity 1.0; on linear RGB
 COLOUR_VISION = {

@@ -78,13 +78,13 @@ def _box(each: Label, x: float, y: float, offset: float, side: tuple[float, floa
 
 
 def _overlap(box: Box, taken: Iterable[Box], samples: NDArray[np.float64]) -> float:
-    """Cost of a label here: the covered share of other labels and markers, and of lines less."""
+    """Cost of a label here: the shares of it and of others that overlap, and of lines less."""
     left, low, right, high = box
     area = (right - left) * (high - low)
     shared = sum(max(0.0, min(right, r) - max(left, a)) * max(0.0, min(high, h) - max(low, b))
-                 for a, b, r, h in taken)
+                 / min(area, (r - a) * (h - b)) for a, b, r, h in taken)
     covered = ((samples >= (left, low)) & (samples <= (right, high))).all(axis=1).sum()
-    return 4.0 * shared / area + 0.1 * float(covered)
+    return 4.0 * shared + 0.1 * float(covered)
 
 
 def _sampled(line: NDArray[np.float64]) -> NDArray[np.float64]:
