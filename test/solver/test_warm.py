@@ -6,6 +6,7 @@ import pytest
 from plan_checks import check, make
 
 from uav_task_alloc import Plan, Task, ThreatZone, Uav, plan
+from uav_task_alloc.study.instances import make_instance
 
 UAVS, TASKS = make(4, 24)
 
@@ -49,6 +50,16 @@ def test_the_tasks_of_a_lost_uav_go_to_the_others():
 def test_a_route_beyond_a_shrunken_range_is_cut():
     uavs = [replace(uav, range=400.0) for uav in UAVS]
     check(quick(uavs, TASKS, warm=BEFORE), uavs, TASKS)
+
+
+@pytest.mark.parametrize('seed', [0, 1, 2])
+def test_a_search_from_short_ranges_passes_through_plans_beyond_them(seed):
+    instance = make_instance(8, 24, 10)
+    uavs = [replace(uav, range=0.5 * uav.range) for uav in instance.uavs]
+    before = quick(uavs, instance.tasks, max_iterations=0)
+    result = quick(uavs, instance.tasks, warm=before, max_iterations=3000, seed=seed)
+    check(result, uavs, instance.tasks)
+    assert result.value == 12.0
 
 
 def test_legs_avoid_a_new_zone_and_tasks_inside_it_are_left_out():

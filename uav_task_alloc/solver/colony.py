@@ -42,6 +42,9 @@ class ColonyParams:
     onlookers: float = 0.2  # least share
     scouts: float = 0.01  # least share
     range_penalty: float = 5.0  # [m/m] first cost of a metre beyond range
+    most_penalty: float = 1000.0  # [m/m] upper bound of that cost
+    cost_growth: float = 300.0  # upper bound of the cost of an unassigned task over the first
+    least_rounds: float = 20.0  # between two updates of these costs
     skipped: float = 0.0  # probability that a round passes over an unassigned task near its seed
     by_value: float = 0.0  # share of rounds that insert about the most valuable tasks first
     selects: bool = False  # tasks have to be left out; no search is spent on those out of reach
@@ -64,7 +67,9 @@ class Colony:
                  learnt: object = None) -> None:
         arrays = problem.arrays
         self.arrays = arrays._replace(range_penalty=arrays.range_penalty.copy(),
-                                      unassigned_cost=arrays.unassigned_cost.copy())
+                                      unassigned_cost=arrays.unassigned_cost.copy(),
+                                      max_unassigned_cost=(
+                                          params.cost_growth * arrays.unassigned_cost))
         self.params, self.best, self.routes = params, copy(start), copy(start)
         self._scratch, self._phase = copy(start), 0
         self._pool = empty_pool(arrays)
@@ -76,7 +81,8 @@ class Colony:
         self._bids = Bidding({kind: floor for kind, floor in floors.items() if floor > 0.0})
         if arrays.hard:
             self.arrays.range_penalty[:] = params.range_penalty
-        self._log.rates[:] = params.skipped, params.by_value
+        self._log.settings[:] = (params.skipped, params.by_value, params.least_rounds,
+                                 params.most_penalty)
         if params.selects:
             self.arrays.unassigned_cost[out_of_reach(problem)] = 0.0
             update_sums(self.arrays, self.best)

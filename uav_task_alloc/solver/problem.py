@@ -21,7 +21,6 @@ from uav_task_alloc.solver.routes import NODE, Arrays, Floats, Ints
 NEIGHBOURS = 24  # nearest tasks of a task
 STARTS = 8  # nearest UAV starts of a task
 UNASSIGNED_LEGS = 20.0  # first cost of not serving an average task, in mean legs
-MAX_COST_GROWTH = 300.0  # upper bound of that cost over the first
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,5 +328,5 @@ def _fill_neighbours(problem: Problem, known: Problem | None,
     finite = a.start_length[:, 0][np.isfinite(a.start_length[:, 0])]
     far = float(finite.mean()) if finite.size else 0.0
     a.unassigned_cost[:] *= a.value / a.value.mean() * max(UNASSIGNED_LEGS * scale, 2.0 * far)
-    a.max_unassigned_cost[:] = MAX_COST_GROWTH * a.unassigned_cost
+    a.max_unassigned_cost[:] = a.unassigned_cost  # a colony may raise it
     return scale

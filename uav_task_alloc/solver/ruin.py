@@ -34,9 +34,10 @@ OVERRANGE_SEED_RATE = 0.2  # share that start at a route beyond range, if there 
 FEW = 0.05  # up to this share of unassigned tasks their cost rises
 COST_GROWTH = 1.3  # by this factor at each update
 BLINK_RATE = 0.01  # share of places skipped
-# entries of RuinLog.rates: probability that a round passes over an unassigned task near its seed;
-# share of rounds that insert about the most valuable tasks first
-SKIPPED, BY_VALUE = range(2)
+# entries of RuinLog.settings: probability that a round passes over an unassigned task near its
+# seed; share of rounds that insert about the most valuable tasks first; least rounds between two
+# updates of the penalties; upper bound of a range penalty [m/m]
+SKIPPED, BY_VALUE, LEAST_ROUNDS, MOST_PENALTY = range(4)
 
 
 class RuinLog(NamedTuple):
@@ -50,7 +51,7 @@ class RuinLog(NamedTuple):
     last_ruined: Ints  # (m) round in which a route was ruined last
     unassigned: Ints  # task nodes unassigned at the last update
     overrange: Ints  # UAVs with routes beyond range at the last update
-    rates: Floats  # (2) SKIPPED, BY_VALUE
+    settings: Floats  # (4) SKIPPED, BY_VALUE, LEAST_ROUNDS, MOST_PENALTY
 
 
 def empty_log(a: Arrays) -> RuinLog:
@@ -59,7 +60,7 @@ def empty_log(a: Arrays) -> RuinLog:
     return RuinLog(np.empty(2 * room, NODE), np.empty(2 * room, np.int64),
                    np.empty(room, NODE), np.empty(room), np.zeros(5, np.int64),
                    np.zeros(a.uavs, np.int64), np.empty(room, np.int64),
-                   np.empty(a.uavs, np.int64), np.zeros(2))
+                   np.empty(a.uavs, np.int64), np.zeros(4))
 
 
 @inline_kernel
@@ -156,7 +157,7 @@ def ruin(a: Arrays, r: Routes, log: RuinLog, mean: float, round_id: int, rng: Rn
         u = r.uav_of[c]
         if u < 0:
             if left_out < 10 and not _is_removed(log, c) and not (
-                    log.rates[SKIPPED] > 0.0 and _passes_over(a, log, c, m, rng)):
+                    log.settings[SKIPPED] > 0.0 and _passes_over(a, log, c, m, rng)):
                 log.removed[log.counts[1]] = c
                 log.counts[1] += 1
                 left_out += 1
@@ -172,7 +173,7 @@ def _passes_over(a: Arrays, log: RuinLog, c: int, m: int, rng: RngState) -> bool
     """Whether an unassigned task is not tried: one out of reach, or by chance. O(1)."""
     if a.unassigned_cost[c - a.uavs] <= 0.0:
         return True
-    return m >= 0 and uniform(rng) < log.rates[SKIPPED]
+    return m >= 0 and uniform(rng) < log.settings[SKIPPED]
 
 
 @inline_kernel
@@ -188,7 +189,7 @@ def _is_removed(log: RuinLog, t: int) -> bool:
 def _sort_removed(a: Arrays, log: RuinLog, rng: RngState) -> None:
     """Sort removed tasks: at random, furthest, nearest or costliest first. O(removed^2)."""
     kind = below(rng, 8)
-    if log.rates[BY_VALUE] > 0.0 and uniform(rng) < log.rates[BY_VALUE]:
+    if log.settings[BY_VALUE] > 0.0 and uniform(rng) < log.settings[BY_VALUE]:
         kind = 8
     for i in range(log.counts[1]):
         t = log.removed[i]

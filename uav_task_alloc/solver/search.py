@@ -19,9 +19,17 @@ from uav_task_alloc.solver.routes import (
     total_cost_kernel,
     update_sums,
 )
-from uav_task_alloc.solver.ruin import RuinLog, list_unassigned_and_overrange, recreate, ruin, undo
+from uav_task_alloc.solver.ruin import (
+    LEAST_ROUNDS,
+    MOST_PENALTY,
+    RuinLog,
+    list_unassigned_and_overrange,
+    recreate,
+    ruin,
+    undo,
+)
 
-MIN_RANGE_PENALTY, MAX_RANGE_PENALTY = 0.1, 1000.0  # [m/m] bounds of a range penalty
+MIN_RANGE_PENALTY = 0.1  # [m/m]
 PENALTY_GROWTH, PENALTY_DECAY = 1.2, 0.9  # factors of a range penalty at each update
 PENALTY_UPDATES = 8  # updates in as many rounds as there are tasks
 
@@ -35,11 +43,12 @@ def _update_penalties(a: Arrays, r: Routes, log: RuinLog, pool: Pool) -> int:
             if in_range:
                 a.range_penalty[u] = max(MIN_RANGE_PENALTY, a.range_penalty[u] * PENALTY_DECAY)
             elif r.length[u] > a.range_left[u] + TINY:
-                a.range_penalty[u] = min(MAX_RANGE_PENALTY, a.range_penalty[u] * PENALTY_GROWTH)
+                a.range_penalty[u] = min(log.settings[MOST_PENALTY],
+                                         a.range_penalty[u] * PENALTY_GROWTH)
     list_unassigned_and_overrange(a, r, log)
     collect(a, r, pool)
     update_sums(a, r)
-    return max(20, a.unassigned_cost.size // PENALTY_UPDATES)
+    return max(int(log.settings[LEAST_ROUNDS]), a.unassigned_cost.size // PENALTY_UPDATES)
 
 
 @kernel
