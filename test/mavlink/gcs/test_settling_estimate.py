@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A vehicle whose first position estimates jump up and down while it gets its first list."""
+import math
+
 import pytest
 from findings_bench import FindingsBench
 from mission_bench import task_list
+from piece_bench import Track, list_of, strip
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 SETTLES = {'arming_delay': 3.0, 'boot_delay': 1.0, 'settling_time': 8.0}
@@ -34,3 +37,21 @@ def test_after_its_landing_it_is_not_armed_by_the_bridge():
     bench.run(limit=2.0)
     assert not bench.executor().sender.armed_here
     assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
+
+
+@pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+def test_strips_are_flown_once_after_the_first_estimate_has_jumped_on_the_ground(kind):
+    bench = FindingsBench(kind, configs={1: SETTLES})
+    boot = bench.vehicles[1].flight.boot
+    settled = boot.times.position + boot.times.settling
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        m.get_type() == 'GLOBAL_POSITION_INT' and boot.elapsed < settled - 0.4) else None)
+    track = Track(bench.discover())
+    assert bench.run(lambda: bench.executor().telemetry.has_position)
+    assert math.dist(bench.executor().telemetry.position, track.points[-1]) > 30.0
+    assert bench.run(lambda: boot.elapsed > settled + 1.0)
+    bench.assign(list_of(strip(0), strip(1), turned=('F#1',)))
+    assert bench.run(lambda: len(bench.completed()) == 2, 200.0)
+    assert not bench.noted('not flown')
+    for each in (strip(0), strip(1)):
+        assert set(track.times_flown(each)) == {1}

@@ -31,6 +31,7 @@ from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRule
 from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.restored_record import restore_record
 from uav_task_alloc.mavlink.gcs.resume import MAX_AGE
 from uav_task_alloc.mavlink.gcs.send_gate import allowed_messages
 from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
@@ -49,8 +50,6 @@ from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Task
-
-_SEEN = 7  # values of a position in the authority record
 
 
 class MissionExecutor:
@@ -104,33 +103,13 @@ class MissionExecutor:
                                   self._end_of_list, self._status_text_log)
         self.holds = HoldRule(self.sender, self.telemetry, self.watch, profile, self.onboard,
                               execution.update_mission, self.notes)
-        self._restore(record)
+        restore_record(record, self.onboard, self.watch, profile)
         self._rules = (
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
             self.holds.hold, self._upload, self._read, self._has_list, self._resume,
             self._may_act, self._hold_first, self._end_of_list.held_too_long, self.holds.stay,
             self._end_of_list.empty, self.fence.clear_way, execution.update_mission,
             takeoff.take_off, execution.fly)
-
-    def _restore(self, record: AuthorityRecord | None) -> None:
-        """Pass what the previous run recorded to `onboard.resume`."""
-        onboard, resume = self.onboard, self.onboard.resume
-        if record is not None:
-            onboard.list.stored_pieces, resume.recorded_upload = record.pieces, record.uploading
-            resume.recorded = record.mission, record.current, record.arrived
-            resume.passed, onboard.progress.coverage.recorded = record.passed, True
-            resume.ahead = {mark.task: mark[1:4] for mark in record.ahead}
-            for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
-                t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
-                resume.note_seen(PositionSample(t, (x, y, z), (east, north, up)))
-            resume.was_disarmed, resume.was_in_mission = not record.armed, (
-                self.profile.mode_function(record.mode or 0) is ModeFunction.MISSION)
-            # the current item may be of the replaced mission, or set by another party
-            resume.current_unreliable = (
-                record.replacing_since is not None and not self.profile.atomic) or (
-                record.state is AuthorityState.LOST and not resume.was_in_mission)
-        for mark in self.watch.marks.values():
-            resume.note_mark(mark.task, mark[1:4], mark.flown)
 
     @property
     def going_home(self) -> bool:
@@ -284,6 +263,8 @@ class MissionExecutor:
             self.onboard.progress.add_position(
                 PositionSample(message.time_boot_ms * 1e-3, position, velocity), newest, now,
                 self.telemetry.frame)
+            if self.telemetry.grounded:  # its estimate settles
+                self.onboard.progress.positions.end_doubt()
 
     def _leg_start(self) -> LegStart | None:
         """Its position, at the height after a take-off if one is due; None: unknown."""

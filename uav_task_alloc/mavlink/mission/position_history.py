@@ -174,6 +174,10 @@ class PositionHistory:
         """Whether the estimate has jumped, so that the positions prove nothing."""
         return now < self._invalid_until
 
+    def end_doubt(self) -> None:
+        """Note that a vehicle on the ground has jumped: its estimate settles, nothing is flown."""
+        self._invalid_until = -math.inf
+
     def can_have_reached(self, item: Item, now: float) -> bool:
         """Whether the newest position allows that an item was reached, or is not usable."""
         if self.place is None or now - self.place[1] > _FRESH or self.invalid(now):
