@@ -89,3 +89,21 @@ def test_a_silence_in_an_upload_is_flown_along_the_way(kind):
     assert bench.run(lambda: len(bench.completed()) == 2, 300.0)
     for each in (line, other):
         assert set(track.times_flown(each)) == {1}
+
+
+@BOTH
+@pytest.mark.parametrize('flown', [True, False])
+def test_a_strip_is_completed_where_the_vehicle_is_lost_at_its_end(kind, flown):
+    task = strip(0)
+    bench, _ = surveying(kind, list_of(task, strip(1)), tick=0.05)
+    body = bench.vehicles[1].flight.body
+    if flown:
+        assert bench.run(lambda: [e for e in bench.truth[1] if e.name == 'item_reached'
+                                  and math.dist(e.point, task.path[-1]) < 5.0], 200.0)
+        bench.run(limit=0.4)
+    else:
+        assert bench.run(lambda: body.position[0] > 150.0 and body.position[1] > 58.0, 200.0)
+    bench.line.cut = True
+    assert not bench.completed()
+    bench.run(limit=4.0)
+    assert bench.completed() == ['F#0'] * flown

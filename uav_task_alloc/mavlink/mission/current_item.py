@@ -11,6 +11,7 @@ from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from uav_task_alloc.actions import SETTLE
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
 from uav_task_alloc.mavlink.mission.epoch import Epoch
@@ -20,6 +21,8 @@ from uav_task_alloc.mavlink.mission.passed_items import NO_TASKS, Claim, PassedI
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import ReachedEpoch
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
+
+_SILENT = 3.0  # [s] without a frame after which a vehicle may be lost
 
 
 class CurrentItem:
@@ -217,6 +220,28 @@ class CurrentItem:
             for item in judged.flown:
                 self._tasks.complete(item.task, item.place)
             self._pass_over(judged.passed_over, claim)
+
+        if now - self._frames.received_at > _SILENT:
+            self._complete_way()
+
+    def _complete_way(self) -> None:
+        """Complete the task of a vehicle that may be lost, where its way is flown to the end.
+
+        Only the end of actions and the stop of a second there are missing.
+        """
+        items, begin = self._epoch.items, self._epoch.current
+        end = None if begin is None else next(
+            (n for n in range(begin, len(items)) if items[n].completes), None)
+        if begin is None or end is None or not items[end].along:
+            return
+        last, before = items[end], next(
+            (n for n in reversed(range(begin)) if items[n].position is not None), None)
+        if before is not None and last.task not in self._tasks and (
+                last.params[0] <= SETTLE and items[before].along
+                and all(item.task == last.task and item.position in (None, last.position)
+                        for item in items[before:end])
+                and self._tasks.is_covered(last.task)):
+            self._tasks.complete(last.task, last.place)
 
     def _pass_over(self, items: tuple[Item, ...], claim: Claim) -> None:
         self.passed_over.extend(items)

@@ -2,6 +2,7 @@
 """The received frames of one vehicle by sequence number, to detect lost ones."""
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable
 
@@ -47,6 +48,11 @@ class FrameLog:
             if len(self._order) > _KEPT:
                 self._received.discard(self._order.popleft())
         return number
+
+    @property
+    def received_at(self) -> float:
+        """When [s] a frame was received last; inf where none was."""
+        return self._at if self._known else math.inf
 
     def note_all(self, seqs: Iterable[int], now: float) -> None:
         """Record frames that were not decoded, by their sequence numbers."""
