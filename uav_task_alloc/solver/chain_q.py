@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from uav_task_alloc.solver.colony import Colony, ColonyParams
 from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.ruin import MAX_STRING
 from uav_task_alloc.solver.selection import must_leave_tasks
 from uav_task_alloc.solver.warm import repair
 
@@ -20,7 +21,8 @@ COLD_SELECTION = ColonyParams(start_temperature=150.0, end_temperature=1.3,
 # where ranges run out: exceeding one soon costs more than leaving a task out, so that the search
 # passes from plans beyond range to plans within range and back, often enough in a short budget
 WARM_START = ColonyParams(start_temperature=0.3, end_temperature=0.02, reheat_temperature=3.0,
-                          most_penalty=1e4, cost_growth=3.0, least_rounds=10.0)
+                          most_penalty=1e4, cost_growth=3.0, least_rounds=10.0,
+                          string_floor=float(MAX_STRING))
 _ROUND_TIME = 0.005  # [s] of one flight: the clock is read between flights
 FIXED_ROUNDS = 100  # rounds of a flight where iterations are limited
 EXCHANGES = 20  # how often in a budget a colony takes over the recorder's best

@@ -45,6 +45,7 @@ class ColonyParams:
     most_penalty: float = 1000.0  # [m/m] upper bound of that cost
     cost_growth: float = 300.0  # upper bound of the cost of an unassigned task over the first
     least_rounds: float = 20.0  # between two updates of these costs
+    string_floor: float = 1.0  # tasks that a string may have, also where the mean route has fewer
     skipped: float = 0.0  # probability that a round passes over an unassigned task near its seed
     by_value: float = 0.0  # share of rounds that insert about the most valuable tasks first
     selects: bool = False  # tasks have to be left out; no search is spent on those out of reach
@@ -82,7 +83,7 @@ class Colony:
         if arrays.hard:
             self.arrays.range_penalty[:] = params.range_penalty
         self._log.settings[:] = (params.skipped, params.by_value, params.least_rounds,
-                                 params.most_penalty)
+                                 params.most_penalty, params.string_floor)
         if params.selects:
             self.arrays.unassigned_cost[out_of_reach(problem)] = 0.0
             update_sums(self.arrays, self.best)

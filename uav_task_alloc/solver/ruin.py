@@ -36,8 +36,9 @@ COST_GROWTH = 1.3  # by this factor at each update
 BLINK_RATE = 0.01  # share of places skipped
 # entries of RuinLog.settings: probability that a round passes over an unassigned task near its
 # seed; share of rounds that insert about the most valuable tasks first; least rounds between two
-# updates of the penalties; upper bound of a range penalty [m/m]
-SKIPPED, BY_VALUE, LEAST_ROUNDS, MOST_PENALTY = range(4)
+# updates of the penalties; upper bound of a range penalty [m/m]; length of strings that is allowed
+# where the mean route has fewer tasks
+SKIPPED, BY_VALUE, LEAST_ROUNDS, MOST_PENALTY, STRING_FLOOR = range(5)
 
 
 class RuinLog(NamedTuple):
@@ -51,7 +52,7 @@ class RuinLog(NamedTuple):
     last_ruined: Ints  # (m) round in which a route was ruined last
     unassigned: Ints  # task nodes unassigned at the last update
     overrange: Ints  # UAVs with routes beyond range at the last update
-    settings: Floats  # (4) SKIPPED, BY_VALUE, LEAST_ROUNDS, MOST_PENALTY
+    settings: Floats  # (5) SKIPPED, BY_VALUE, LEAST_ROUNDS, MOST_PENALTY, STRING_FLOOR
 
 
 def empty_log(a: Arrays) -> RuinLog:
@@ -60,7 +61,7 @@ def empty_log(a: Arrays) -> RuinLog:
     return RuinLog(np.empty(2 * room, NODE), np.empty(2 * room, np.int64),
                    np.empty(room, NODE), np.empty(room), np.zeros(5, np.int64),
                    np.zeros(a.uavs, np.int64), np.empty(room, np.int64),
-                   np.empty(a.uavs, np.int64), np.zeros(4))
+                   np.empty(a.uavs, np.int64), np.zeros(5))
 
 
 @inline_kernel
@@ -149,7 +150,7 @@ def ruin(a: Arrays, r: Routes, log: RuinLog, mean: float, round_id: int, rng: Rn
     tasks = a.ends - a.uavs
     seed = _choose_seed(a, r, log, rng)
     served = max(1, tasks // max(1, a.uavs))
-    longest = min(float(MAX_STRING), max(1.0, float(served)))
+    longest = min(float(MAX_STRING), max(log.settings[STRING_FLOOR], float(served)))
     strings = int(1.0 + uniform(rng) * (4.0 * mean / (1.0 + longest) - 1.0))
     left_out = 0
     for m in range(-1, a.near.shape[1]):
