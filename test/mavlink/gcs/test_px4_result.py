@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """PX4 reports its mission as complete after a take-off and a landing: that completes no task."""
+from authority_bench import MODES, flying as authority_flying
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -80,3 +81,18 @@ def test_the_last_task_is_complete_by_the_end_where_its_reached_is_lost_and_a_cu
     bench.run(limit=5.0)
     assert bench.completed() == ['A', 'B']
     assert places(bench) == ['A', 'B']
+
+
+def test_a_take_off_after_a_landing_is_no_flight_in_which_the_mission_can_have_ended():
+    bench = authority_flying('px4', 'A')
+    vehicle, telemetry = bench.vehicles[1], bench.executor().telemetry
+    assert telemetry.airborne_since_mission
+    vehicle.failsafe('ekf', MODES['px4'].land)
+    assert bench.run(lambda: not vehicle.flight.armed)
+    vehicle.failsafe_over()
+    bench.run(limit=8.0)
+    assert bench.hand_over() == ''
+    assert bench.run(lambda: telemetry.airborne, 60.0)
+    assert not telemetry.airborne_since_mission
+    assert bench.run(lambda: bench.completed() == ['A'])
+    assert telemetry.airborne_since_mission

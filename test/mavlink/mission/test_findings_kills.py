@@ -123,10 +123,11 @@ def test_tasks_passed_at_once_survive_a_kill_before_they_are_judged(kind, place)
 
 
 @PX4
-@pytest.mark.parametrize(('state', 'completed'), [
-    (d.MISSION_STATE_COMPLETE, ['A', 'B']), (d.MISSION_STATE_ACTIVE, ['A'])])
+@pytest.mark.parametrize(('state', 'name', 'completed'), [
+    (d.MISSION_STATE_COMPLETE, None, ['A', 'B']), (d.MISSION_STATE_ACTIVE, None, ['A']),
+    (None, 1, ['A', 'B']), (None, 0, ['A'])])
 def test_an_end_reported_just_before_a_reboot_counts_where_it_comes_after_it(
-        kind, state, completed):
+        kind, state, name, completed):
     bench = flying(kind, 'AB')
     assert bench.run(lambda: bench.completed() == ['A'])
     for lost in ('MISSION_ITEM_REACHED', 'MISSION_CURRENT'):
@@ -135,7 +136,8 @@ def test_an_end_reported_just_before_a_reboot_counts_where_it_comes_after_it(
     bench.run(limit=0.8)
     bench.vehicles[1].reboot(bench.now)
     bench.run(limit=2.0)
-    late = d.MAVLink_mission_current_message(1, 2, state, 2)
+    late = d.MAVLink_mission_current_message(1, 2, state, 2) if name is None else (
+        d.MAVLink_mission_item_reached_message(name))
     bench.line.tampers.clear()
     bench.ground_station.receive(1, Codec(1, 1).parse(Codec(1, 1).pack(late))[0], bench.now)
     bench.run(limit=2.0)

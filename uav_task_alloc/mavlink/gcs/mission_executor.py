@@ -246,7 +246,7 @@ class MissionExecutor:
                 self.onboard.note_flown_unset(seq, now)
             ended = self.telemetry.mission_ended and self.onboard.set_current_to is None
             may_have_ended = flying or ended if not self.profile.atomic else (  # PX4: take-off too
-                self.telemetry.airborne and progress.may_have_ended_unseen(seq))
+                self.telemetry.airborne_since_mission and progress.may_have_ended_unseen(seq))
             if may_have_ended and message.mission_state == d.MISSION_STATE_COMPLETE:
                 progress.note_mission_complete(seq, now, self.telemetry.frame)
             if not self.sender.busy and not self.onboard.open:

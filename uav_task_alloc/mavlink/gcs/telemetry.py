@@ -71,6 +71,7 @@ class Telemetry:
         self.altitude = math.nan  # [m] AMSL
         self.battery = math.nan  # 0..1, of the battery with least remaining
         self.armed = False
+        self._landed_since_mission = False  # on the ground since it was in mission mode
         self.mode = ModeFunction.UNKNOWN
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
@@ -118,6 +119,11 @@ class Telemetry:
     def airborne(self) -> bool:
         """Armed and off the ground."""
         return self.armed and (self.height > OFF_GROUND or self.landed in _IN_AIR)
+
+    @property
+    def airborne_since_mission(self) -> bool:
+        """In the air, and not on the ground since it was in mission mode."""
+        return self.airborne and not self._landed_since_mission
 
     @property
     def grounded(self) -> bool:
@@ -254,6 +260,8 @@ class Telemetry:
         self.mode = self._profile.mode_function(message.custom_mode)
         self._mode_frame = self.frame
         self._landed(self.landed)
+        if self.mode is ModeFunction.MISSION:
+            self._landed_since_mission = False
         if message.system_status == d.MAV_STATE_BOOT and self._started:
             self.restart()  # its clock is received later
             self.booted_at = now
@@ -332,6 +340,7 @@ class Telemetry:
         # disarmed: sent before it landed, and armed again it is not in the air by that
         self.landed = (landed if self.armed or landed not in _IN_AIR
                        else d.MAV_LANDED_STATE_UNDEFINED)
+        self._landed_since_mission = self._landed_since_mission or self.grounded
 
     def _current(self, message: Message, now: float) -> None:
         self.current, self.current_at = message.seq, now

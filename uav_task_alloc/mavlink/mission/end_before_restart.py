@@ -12,6 +12,7 @@ from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.flown_path import CLOSE
 from uav_task_alloc.mavlink.mission.item import Item
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
+from uav_task_alloc.mavlink.mission.reached_series import ReachedSeries
 from uav_task_alloc.mavlink.transport.codec import Message
 
 
@@ -30,12 +31,14 @@ class EndBeforeRestart:
         self._epoch, self._tasks, self._positions, self._moves = epoch, tasks, positions, moves
         self._ending: tuple[int, Item, float] | None = None  # index, item, until when [s]
         self._ended: tuple[int, int, float] | None = None  # epoch, index, reported at [s]
+        self._named = False  # its REACHED may repeat one of before
 
-    def note_restart(self, now: float) -> None:
+    def note_restart(self, now: float, series: ReachedSeries) -> None:
         """Note that the vehicle was restarted; call before the epoch ends.
 
         Args:
             now: steady time [s].
+            series: the REACHED received.
         """
         epoch, back = self._epoch, self._moves.set_back_from
         current = epoch.current if back is None or now - back[1] > MAX_MESSAGE_DELAY else back[0]
@@ -45,6 +48,7 @@ class EndBeforeRestart:
             self._positions.distance(item) <= item.radius + CLOSE)
         self._ending = None if item is None or current is None or not at_end else (
             current, item, now + MAX_MESSAGE_DELAY)
+        self._named = series.named_lately(epoch.last_flown, epoch.last_flown + 1, now)
         if self._ending is not None and self._ended is not None and item is not None and (
                 self._ended[:2] == (epoch.number, current)
                 and now - self._ended[2] < MAX_MESSAGE_DELAY):
@@ -57,6 +61,18 @@ class EndBeforeRestart:
         left_at = self._moves.left_at
         return self._moves.in_mission or (math.isfinite(left_at) and (
             self._positions.path.newest - left_at < MAX_MESSAGE_DELAY))
+
+    def note_reached(self, seq: int, now: float) -> None:
+        """Take a MISSION_ITEM_REACHED: a restarted vehicle has reached nothing yet.
+
+        Args:
+            seq: index without home.
+            now: steady time [s].
+        """
+        if self._ending is not None and seq == self._ending[0] and not self._named and (
+                now < self._ending[2]):
+            self._tasks.credit(self._ending[1])
+            self._ending = None
 
     def note_current(self, message: Message, now: float) -> None:
         """Take a MISSION_CURRENT: a restarted vehicle has not flown its mission to the end yet.

@@ -217,7 +217,7 @@ class ProgressTable:
 
     def invalidate(self) -> None:
         """End the epoch: the mission on board is unknown."""
-        self.end_before_restart.note_restart(self._stepped_at)
+        self.end_before_restart.note_restart(self._stepped_at, self._epochs.series)
         self._moves.invalidate(self._stepped_at)
         self._reached.end()
         self._epochs.clear()
@@ -296,6 +296,7 @@ class ProgressTable:
             proven: whether it is known to be of this epoch.
             frame: its number. What is sent once, after the mission was taken, is of it.
         """
+        self.end_before_restart.note_reached(seq, now)
         self._reached.note(seq, now, proven, frame)
 
     def reached_first_at(self, seq: int, now: float, frame: int) -> float:
