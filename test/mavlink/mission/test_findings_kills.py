@@ -372,3 +372,19 @@ def test_a_last_task_reached_before_a_reboot_and_a_restart_at_once_is_known(x, r
     reports.note_current(0, 1.4, 3, located=False)
     taken = reports.take_reached(items_at(0.0, 100.0), recorded, 2.0)
     assert [each.seq for each in taken] == [1] * known
+
+
+def test_the_clock_of_a_reboot_drops_no_positions_that_came_since_the_bridge_was_restarted():
+    flight = Flight()
+    flight.table.positions.clear()
+    flight.table.positions.add_recorded(PositionSample(20.0, (0.0, 0.0, 50.0), (0.0, 0.0, 0.0)))
+    flight.now = 20.0
+    flight.begin(A=100.0, B=900.0)
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(101.0)
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    flight.stay(0.4, SPEED)
+    flight.table.add_position(  # the first one of after the reboot, which is not noticed yet
+        PositionSample(3.0, (105.0, 0.0, 0.0), (0.0, 0.0, 0.0)), True, flight.now, flight.frame())
+    flight.table.invalidate()
+    assert list(flight.table.completed) == ['A']

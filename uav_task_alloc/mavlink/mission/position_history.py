@@ -57,7 +57,7 @@ class PositionHistory:
         Returns:
             Whether the vehicle was restarted while no bridge ran: the path begins here.
         """
-        begins = self._recorded_at is not None and (
+        begins = self._recorded_at is not None and not self.continues_recorded and (
             sample.t < self._recorded_at - MAX_MESSAGE_DELAY)
         if begins:
             self.clear()
