@@ -71,7 +71,6 @@ class Telemetry:
         self.altitude = math.nan  # [m] AMSL
         self.battery = math.nan  # 0..1, of the battery with least remaining
         self.armed = False
-        self._landed_since_mission = False  # on the ground since it was in mission mode
         self.mode = ModeFunction.UNKNOWN
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
@@ -94,8 +93,8 @@ class Telemetry:
         self.frame = 0  # frame number of the latest message
         self._newest: dict[str, tuple[int, float]] = {}  # sequence number and time [s] by type
         self._first_at: float | None = None  # [s] of the first position
-        self._fix = self._estimates = False
-        self._started = False  # it has finished booting
+        # of its position; it has finished booting; was on the ground since it was in mission mode
+        self._fix = self._estimates = self._started = self._landed_since_mission = False
         self.has_position = False  # valid by its estimator or its GPS
         self._batteries: dict[int, tuple[float, float]] = {}  # remaining 0..1 and time [s] by id
         self._handlers = self._message_handlers()
