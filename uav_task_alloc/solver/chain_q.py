@@ -2,7 +2,6 @@
 """The default solver, chain_q: bee colonies, one a thread, improve the recorder's best plan."""
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -16,8 +15,8 @@ from uav_task_alloc.solver.warm import repair
 COLD_START = ColonyParams()
 # where not all tasks can be served: the choice of tasks, more than their order
 COLD_SELECTION = ColonyParams(start_temperature=150.0, end_temperature=1.3,
-                              reheat_temperature=60.0, range_penalty=math.inf, skipped=0.3,
-                              by_value=0.3, selects=True)
+                              reheat_temperature=60.0, skipped=0.3, by_value=0.3,
+                              selects=True)
 # where ranges run out: exceeding one soon costs more than leaving a task out, so that the search
 # passes from plans beyond range to plans within range and back, often enough in a short budget
 WARM_START = ColonyParams(start_temperature=0.3, end_temperature=0.02, reheat_temperature=3.0,
