@@ -5,6 +5,7 @@ from authority_bench import (
     ARDUPILOT,
     BOTH,
     COPTER,
+    MODES,
     AuthorityBench,
     H,
     L,
@@ -15,6 +16,7 @@ from authority_bench import (
     in_flight,
     on_ground,
     sends_no_command,
+    set_mode,
     status_is,
 )
 from mission_bench import task_list
@@ -227,3 +229,17 @@ def test_an_unknown_autopilot_is_held_by_a_hand_over_and_never_by_a_mode(kind):
     assert bench.reaches(S)
     vehicle.kill_switch()
     assert bench.reaches(L)
+
+
+@BOTH
+def test_a_return_set_after_a_reboot_on_the_ground_that_is_not_seen_yet_is_of_another(kind):
+    bench, hidden = on_ground(kind, H), [True]
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        hidden and hasattr(m, 'time_boot_ms')) else None)
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=1.2)
+    bench.from_station(set_mode(MODES[kind].rtl, kind))
+    bench.run(limit=2.0)
+    hidden.clear()
+    assert bench.reaches(L, 8.0)
+    assert sends_no_command(bench)

@@ -101,8 +101,9 @@ class ModeChanges:
             state.suspend_until_explained(lambda t: self._mission_ended(mode, t), why, now)
         elif new is ModeClass.HOLD:
             self._hold_set(before, mode, now, why)
-        elif not state.flown and not state.armed and state.authority.held:
-            # never armed: a reboot looks the same until a message with its clock is received
+        elif not (state.flown or state.armed or state.is_return(mode)) and state.authority.held:
+            # never armed: a reboot looks the same until a message with its clock is received,
+            # but no vehicle boots into its return
             state.suspend_until_explained(self._rebooted_since(), why, now)
         elif state.authority.state is not AuthorityState.NONE or state.telemetry.past_boot:
             state.apply_taken(why, now)
