@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command of the demo up to the start of its nodes, and its end; `make demo` flies it."""
 import contextlib
+import ctypes
 import os
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -36,6 +38,15 @@ def test_finding_34_a_folder_with_files_of_others_is_refused_and_left_as_it_is(
     assert demo.main(['--out', str(thesis.parent)]) == 1
     assert 'thesis.tex' in capsys.readouterr().err
     assert thesis.read_text() == 'years of work'
+
+
+@pytest.mark.parametrize(('lost', 'printed'), [(KeyboardInterrupt, False), (ValueError, True)])
+def test_a_signal_while_c_calls_python_prints_no_traceback(monkeypatch, capfd, lost, printed):
+    def fail(*_):
+        raise lost
+    monkeypatch.setattr(sys, 'unraisablehook', demo.report_unraisable)
+    ctypes.CFUNCTYPE(None)(fail)()
+    assert ('Traceback' in capfd.readouterr().err) is printed
 
 
 def test_finding_34_a_bad_scenario_costs_no_earlier_results(tmp_path, capsys, no_nodes):

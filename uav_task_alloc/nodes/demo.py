@@ -205,9 +205,16 @@ def write_results(out: Path, duration: float) -> list[str]:
     return find_faults(summary)
 
 
+def report_unraisable(lost: sys.UnraisableHookArgs) -> None:
+    """Report an exception that was lost where C calls Python, but not that of a signal."""
+    if lost.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(lost)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Command line of the demo; returns the exit status, 130 after a signal."""
     signals: list[int] = []
+    hook, sys.unraisablehook = sys.unraisablehook, report_unraisable
 
     def interrupt(number: int, _: object) -> None:
         signals.append(number)  # the exception is lost where C calls Python, as LLVM does
@@ -223,6 +230,8 @@ def main(argv: list[str] | None = None) -> int:
     except (AllocError, OSError) as error:
         print(f'demo: {error}', file=sys.stderr)
         return 1
+    finally:
+        sys.unraisablehook = hook
 
 
 def _run(argv: list[str] | None, signals: list[int]) -> int:
