@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 
@@ -27,6 +28,7 @@ from uav_task_alloc.scenario.node_parameters import Parameters
 _PACKAGE = 'uav_task_alloc'
 _EXIT_TIMEOUT = 15.0  # [s]; the bridge waits up to 10 s for a running upload
 _INTERRUPTED = 130  # exit status of a shell after Ctrl-C
+_STOPPED = 'demo: stopped; there is no summary'
 _COMPILING, _READY = 'compiling kernels (', ']: ready'  # in the log of the allocator
 _FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations', 'separation_losses')
 
@@ -144,24 +146,26 @@ def find_faults(summary: Mapping[str, object]) -> list[str]:
     return [f'{name} = {summary[name]}' for name in _FAULTS if summary[name]]
 
 
-def fly_scenario(args: argparse.Namespace, signals: list[int]) -> int:
+def fly_scenario(args: argparse.Namespace) -> int:
     """Fly a scenario and write its results into args.out.
 
     Args:
         args: of the command line.
-        signals: those to stop, received so far; later ones are added.
 
     Returns:
         0 when no task was lost or flown twice, no zone entered, no separation lost, and every
         node exited in order.
+
+    Raises:
+        KeyboardInterrupt: the flight was stopped by a signal.
     """
     started_at = time.monotonic()
     out = args.out
     load(args.scenario)  # an invalid one must not cost earlier results
     run_folder.prepare(out)
-    with received_signals(signals):
-        if signals:
-            raise KeyboardInterrupt
+    signals: list[int] = []
+    # an exception while the nodes are started would leave some of them running
+    with signal_handler(lambda number, _: signals.append(number)):
         processes = start_nodes(args, out)
         try:
             faults = wait_for_end(processes, args.limit, signals)
@@ -177,19 +181,16 @@ def fly_scenario(args: argparse.Namespace, signals: list[int]) -> int:
     return 1 if faults else 0
 
 
-@contextmanager
-def received_signals(signals: list[int]) -> Iterator[None]:
-    """Within `with`, signals to stop are added to a list and interrupt nothing.
-
-    An exception while the nodes are started would leave some of them running.
-    """
-    before = {number: signal.signal(number, lambda number, _: signals.append(number))
+@contextlib.contextmanager
+def signal_handler(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Within `with`, a handler receives the signals to stop."""
+    before = {number: signal.signal(number, handler)
               for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 def write_results(out: Path, duration: float) -> list[str]:
@@ -205,36 +206,32 @@ def write_results(out: Path, duration: float) -> list[str]:
     return find_faults(summary)
 
 
-def report_unraisable(lost: sys.UnraisableHookArgs) -> None:
-    """Report an exception that was lost where C calls Python, but not that of a signal."""
-    if lost.exc_type is not KeyboardInterrupt:
-        sys.__unraisablehook__(lost)
-
-
 def main(argv: list[str] | None = None) -> int:
     """Command line of the demo; returns the exit status, 130 after a signal."""
-    signals: list[int] = []
-    hook, sys.unraisablehook = sys.unraisablehook, report_unraisable
-
-    def interrupt(number: int, _: object) -> None:
-        signals.append(number)  # the exception is lost where C calls Python, as LLVM does
-        raise KeyboardInterrupt
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, interrupt)
     try:
-        return _run(argv, signals)
+        with signal_handler(_exit_at_once):
+            return _run(argv)
     except KeyboardInterrupt:
-        print('demo: stopped; there is no summary', file=sys.stderr)
+        print(_STOPPED, file=sys.stderr)
         return _INTERRUPTED
     except (AllocError, OSError) as error:
         print(f'demo: {error}', file=sys.stderr)
         return 1
-    finally:
-        sys.unraisablehook = hook
 
 
-def _run(argv: list[str] | None, signals: list[int]) -> int:
+def _exit_at_once(*_: object) -> None:
+    """Exit on a signal while no nodes run.
+
+    An exception would be lost, printed or replaced by another one where C calls Python, as in
+    LLVM or during an import of numba.
+    """
+    with contextlib.suppress(Exception):  # the signal may have interrupted a write to it
+        sys.stdout.flush()
+    os.write(2, f'{_STOPPED}\n'.encode())
+    os._exit(_INTERRUPTED)
+
+
+def _run(argv: list[str] | None) -> int:
     share = Path(get_package_share_directory(_PACKAGE))
     parser = OptionParser('', __doc__ or '')
     parser.prog = 'demo'
@@ -257,7 +254,7 @@ def _run(argv: list[str] | None, signals: list[int]) -> int:
     # several demos on one machine, or in one network, must not exchange messages
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    return fly_scenario(args, signals)
+    return fly_scenario(args)
 
 
 if __name__ == '__main__':
