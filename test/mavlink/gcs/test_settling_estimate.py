@@ -8,6 +8,9 @@ from mission_bench import task_list
 from piece_bench import Track, list_of, strip
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.mission.flown_path import PositionSample
+from uav_task_alloc.mavlink.mission.position_history import PositionHistory
+
 SETTLES = {'arming_delay': 3.0, 'boot_delay': 1.0, 'settling_time': 8.0}
 
 
@@ -55,3 +58,34 @@ def test_strips_are_flown_once_after_the_first_estimate_has_jumped_on_the_ground
     assert not bench.noted('not flown')
     for each in (strip(0), strip(1)):
         assert set(track.times_flown(each)) == {1}
+
+
+@pytest.mark.parametrize('before', [1.8, 2.4, 3.0])  # [s]
+def test_strips_are_flown_once_after_an_estimate_that_settled_in_the_climb(before):
+    bench = FindingsBench('px4', configs={1: SETTLES})
+    boot = bench.vehicles[1].flight.boot
+    settled = boot.times.position + boot.times.settling
+    # reported as on the ground, at a height below it, until the last jump
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        m.get_type() == 'EXTENDED_SYS_STATE' and -before < boot.elapsed - settled < 0.0) else None)
+    track = Track(bench.discover())
+    assert bench.run(lambda: boot.elapsed > settled - before)
+    bench.assign(list_of(strip(0), strip(1), turned=('F#1',)))
+    assert bench.run(lambda: len(bench.completed()) == 2, 200.0)
+    assert not bench.noted('not flown')
+    for each in (strip(0), strip(1)):
+        assert set(track.times_flown(each)) == {1}
+
+
+@pytest.mark.parametrize('speedup', [1.0, 8.0])
+def test_positions_are_in_doubt_after_a_jump_for_a_time_of_the_vehicle(speedup):
+    def add(x, t):
+        history.add(PositionSample(t, (x, 0.0, 50.0), (0.0, 0.0, 0.0)), True, t / speedup)
+    history, jump = PositionHistory(), 20.0
+    for each in range(400):  # 80 s at 5 Hz
+        t = each / 5.0
+        add(100.0 if t >= jump else 0.0, t)
+        assert history.invalid(t / speedup) == (jump <= t < jump + 60.0)
+    history.clear()  # rebooted: its clock begins again, and so does the estimate
+    add(100.0, 5.0)
+    assert not history.invalid(5.0 / speedup)

@@ -18,7 +18,8 @@ from uav_task_alloc.model import Point
 
 _REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
 _FRESH = 3.0  # [s] for which a position is the present one
-_JUMP_RECOVERY = 60.0  # [s] after a jump of the estimate, in which a second jump ends it
+_JUMP_RECOVERY = 60.0  # [s] of the vehicle, after a jump of its estimate; a second one ends it
+_SETTLING = 10.0  # [s] after a jump on the ground, in which it may jump once more in flight
 _AT_ONCE = 2.0  # [s] in which a vehicle does not fly two legs
 _FRAME_TIME = 0.2  # [s] accuracy of a frame's time from its place among other frames
 _CLOCKS = 600  # changes of the clock: 6 s of a clock 20 times as fast as ours
@@ -33,7 +34,9 @@ class PositionHistory:
     def __init__(self) -> None:
         self.path = FlownPath()
         self.place: tuple[Point, float] | None = None  # newest, received at [s]
-        self._invalid_until = -math.inf  # [s] the estimate has jumped
+        # vehicle time [s] of the newest jump of the estimate, and until which it is in doubt
+        self._doubt = -math.inf, -math.inf
+        self._settling_until = -math.inf  # vehicle time [s]: it has jumped on the ground
         self._stamps: deque[tuple[int, float]] = deque(maxlen=_STAMPS)  # frame, vehicle time
         self._recorded_at: float | None = None  # vehicle time [s] of one of the previous run
         # item and since [s] of the last `was_inside`, the newest position then, how many had come
@@ -61,6 +64,8 @@ class PositionHistory:
             sample.t < self._recorded_at - MAX_MESSAGE_DELAY)
         if begins:
             self.clear()
+        if not self._clocks and sample.t < self._doubt[0]:  # restarted
+            self._doubt, self._settling_until = (-math.inf, -math.inf), -math.inf
         if not self._clocks or sample.t - now > self._clocks[-1][1]:
             self._clocks.append((now, sample.t - now))
             del self._clocks[:-_CLOCKS]
@@ -68,8 +73,8 @@ class PositionHistory:
             self._stamps.append((frame, sample.t))
         if newest:
             if self.path.jumps(sample):
-                returns = now < self._invalid_until
-                self._invalid_until = now + (_FRESH if returns else _JUMP_RECOVERY)
+                returns = sample.t < max(self._doubt[1], self._settling_until)
+                self._doubt = sample.t, sample.t + (_FRESH if returns else _JUMP_RECOVERY)
             self.place = sample.position, now
         self.path.add(sample)
         return begins
@@ -172,11 +177,13 @@ class PositionHistory:
 
     def invalid(self, now: float) -> bool:
         """Whether the estimate has jumped, so that the positions prove nothing."""
-        return now < self._invalid_until
+        return self.vehicle_time(now) < self._doubt[1]
 
     def end_doubt(self) -> None:
         """Note that a vehicle on the ground has jumped: its estimate settles, nothing is flown."""
-        self._invalid_until = -math.inf
+        if self._doubt[1] > -math.inf:
+            self._settling_until = self._doubt[0] + _SETTLING
+            self._doubt = self._doubt[0], -math.inf
 
     def can_have_reached(self, item: Item, now: float) -> bool:
         """Whether the newest position allows that an item was reached, or is not usable."""
