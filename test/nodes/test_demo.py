@@ -2,6 +2,7 @@
 """The command of the demo up to the start of its nodes, and its end; `make demo` flies it."""
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -12,6 +13,7 @@ import pytest
 from ament_index_python.packages import get_package_prefix
 
 from uav_task_alloc.nodes import demo
+from uav_task_alloc.nodes.ros.udp_ports import free_domain
 
 pytestmark = pytest.mark.ros
 
@@ -37,6 +39,14 @@ def test_finding_34_a_folder_with_files_of_others_is_refused_and_left_as_it_is(
     assert thesis.read_text() == 'years of work'
 
 
+def test_a_domain_in_which_another_node_takes_part_is_not_chosen():
+    domain = free_domain(50)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
+        participant.bind(('', 7410 + 250 * domain + 2))
+        assert free_domain(domain) not in (domain, 0)
+    assert free_domain(domain) == domain
+
+
 def test_finding_34_a_bad_scenario_costs_no_earlier_results(tmp_path, capsys, no_nodes):
     with pytest.raises(Started):
         demo.main(['--out', str(tmp_path / 'out')])
@@ -59,6 +69,7 @@ def test_finding_34_the_results_of_the_last_demo_are_removed(tmp_path, no_nodes)
 _SIGNAL_IN_AN_IMPORT = """
 import signal, sys
 from uav_task_alloc.nodes import demo
+from uav_task_alloc.nodes.ros.udp_ports import free_domain
 
 def load(_):
     try:

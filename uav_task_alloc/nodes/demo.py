@@ -20,7 +20,7 @@ from ament_index_python.packages import get_package_prefix, get_package_share_di
 from uav_task_alloc.cli.options import OptionParser
 from uav_task_alloc.cli.outputs import check_file
 from uav_task_alloc.errors import AllocError, InvalidValue
-from uav_task_alloc.nodes.ros.udp_ports import free_port
+from uav_task_alloc.nodes.ros.udp_ports import free_domain, free_port
 from uav_task_alloc.record import ground_truth, run_folder
 from uav_task_alloc.scenario import load, simulation_parameters
 from uav_task_alloc.scenario.node_parameters import Parameters
@@ -252,7 +252,7 @@ def _run(argv: list[str] | None) -> int:
         raise InvalidValue('--record', str(args.record), 'a file that does not exist')
     check_file('--record', args.record)
     # several demos on one machine, or in one network, must not exchange messages
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain(1 + os.getpid() % 100)))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     return fly_scenario(args)
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UDP ports for a fleet that is simulated on this machine."""
+"""UDP ports and the ROS domain for a fleet that is simulated on this machine."""
 from __future__ import annotations
 
 import socket
+
+_DOMAINS = 101  # 0 to 101: above are ports that Linux assigns at random
 
 
 def free_port() -> int:
@@ -14,3 +16,31 @@ def free_port() -> int:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(('127.0.0.1', 0))
         return int(probe.getsockname()[1])
+
+
+def free_domain(preferred: int) -> int:
+    """Find a ROS domain in which nothing on this machine takes part.
+
+    Args:
+        preferred: number of the domain to begin with, in 1 to 101.
+
+    Returns:
+        The first one without a participant, by the UDP ports at which DDS participants are
+        discovered; `preferred` where each has one.
+    """
+    return next((domain for domain in (*range(preferred, _DOMAINS + 1), *range(1, preferred))
+                 if _has_no_participant(domain)), preferred)
+
+
+def _has_no_participant(domain: int) -> bool:
+    """Whether no discovery port of a domain is in use (DDSI-RTPS 9.6.2.3).
+
+    Only those of the first ten participants are tried: a new one takes the lowest free port.
+    """
+    for participant in range(10):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(('', 7410 + 250 * domain + 2 * participant))
+            except OSError:
+                return False
+    return True
