@@ -97,3 +97,10 @@ def test_a_corner_that_is_overshot_for_a_moment_does_not_end_a_pass(speedup, pas
 def test_a_strip_that_was_left_in_between_is_not_flown():
     ways = (-20, 40), (60, 40), (60, 70), (140, 70), (140, 40), (200, 40), (200, 80), (-20, 80)
     assert [len(rows) for rows in piece_passes(run(), flown(*ways)).values()] == [0, 1]
+
+
+@pytest.mark.parametrize(('again', 'passes'), [
+    (60, 1), (30, 1), (0, 1), (65, 1), (85, 0), (160, 0)])
+def test_a_strip_that_was_left_is_flown_when_the_vehicle_goes_on_where_it_left_it(again, passes):
+    ways = (-20, 40), (60, 40), (60, 120), (again, 100), (again, 40), (200, 40), (200, 80)
+    assert len(piece_passes(run(), flown(*ways))['field#1']) == passes

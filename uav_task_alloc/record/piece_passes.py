@@ -15,7 +15,7 @@ from uav_task_alloc.record.run_state import RunState
 _BESIDE = 5.0  # [m] from a way, within which a vehicle flies along it
 _SHARE = 0.8  # of a way that a pass covers at least
 _CORNER = 6.0  # [m] that a vehicle may cut at each end
-_ASIDE = 10.0  # [s] that a vehicle may be further off: it overshoots a corner, or stops for a list
+_ASIDE = 10.0  # [s] that it may be further off, for a corner or a list, and go on elsewhere
 _STEP = 2.0  # [m] between points of a way that are checked
 _MOMENT = 3.0  # [s] before and after a pass in which items at its ends are reached
 
@@ -50,9 +50,9 @@ def piece_passes(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]
 
     Returns:
         By id of the piece. A pass comes within 5 m of four fifths of the way and near both ends,
-        and is never further off for more than 10 s: one that a lost vehicle did not finish is
-        none. Of several, one without mission items at both ends leads elsewhere, and does not
-        count.
+        and is never further off for more than 10 s, unless the vehicle goes on where it left the
+        way, or before: one that a lost vehicle did not finish is none. Of several, one without
+        mission items at both ends leads elsewhere, and does not count.
     """
     tracks = {uav: [TrueSample(wall, point) for wall, point in resampled(track)]
               for uav, track in truth.tracks.items()}
@@ -81,12 +81,13 @@ def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[tuple
     for sample in track:
         inside = all(a <= v <= b for a, v, b in zip(low, sample.point, high, strict=True))
         if inside and _is_beside(sample.point, way):
+            if along and sample.wall - along[-1].wall > _ASIDE and min(
+                    math.dist(sample.point, each.point) for each in along) > _BESIDE + _CORNER:
+                along.clear()
             along.append(sample)
             left = False
         elif along and not left and _is_whole(along, way):
             yield along[0].wall, along[-1].wall
-            along.clear()
-        elif along and sample.wall - along[-1].wall > _ASIDE:
             along.clear()
         else:
             left = True
