@@ -138,3 +138,17 @@ def test_polylines_are_imported_without_the_compiler():
     code = 'import sys, uav_task_alloc.geometry.polyline; print("numba" in sys.modules)'
     assert subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                           check=True).stdout == 'False\n'
+
+
+@pytest.mark.parametrize(('position', 'velocity', 'passed'), [
+    ((50.0, 60.0, 0.0), (-4.0, -8.0, 0.0), 0),  # it turns back to the first point
+    ((50.0, 60.0, 0.0), (10.0, 1.0, 0.0), 1),  # to neither: as without a velocity
+    ((50.0, 60.0, 0.0), (2.0, -1.5, 0.0), 1),  # to the last
+    ((50.0, 60.0, 0.0), (0.0, 0.5, 0.0), 0),  # it stands
+    ((50.0, 8.0, 0.0), (-10.0, 0.0, 0.0), 1),  # it follows the polyline
+    ((50.0, 8.0, 0.0), (0.0, 0.0, 0.0), 1)])
+def test_a_vehicle_off_the_polyline_has_not_passed_a_point_to_which_it_flies(
+        position, velocity, passed):
+    points = (20.0, 0.0, 0.0), (130.0, 0.0, 0.0)
+    assert points_passed(position, points) == 1
+    assert points_passed(position, points, velocity=velocity) == passed

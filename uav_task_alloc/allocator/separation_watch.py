@@ -213,7 +213,7 @@ class SeparationWatch:
         via, place = each.end_via, flight.position
         if not via:
             return _own_return(record, flight.pace)
-        ahead = via[points_passed(place, via):]
+        ahead = via[flight.passed(via):]
         share = flight.share(ahead[0] if ahead else (*record.home[:2], place[2]))
         return _home([(0.0, place)], record, flight.pace, ahead, share)
 
@@ -242,7 +242,7 @@ class SeparationWatch:
                 clock += stop.wait
                 points.append((clock, place))
             if k == 0:
-                leg = leg[points_passed(place, leg):]
+                leg = leg[flight.passed(leg):]
                 share = 0.0 if climbs or clock > 0.0 else flight.share(leg[0])
                 if climbs:
                     top = _climbed(record, leg[0][2])

@@ -11,6 +11,9 @@ from itertools import pairwise
 
 Coordinates = Sequence[float]  # [m], 2 or 3 of them
 _TIE = 1e-6  # [m] distances that differ by less are equal: rounding at coordinates of 1e8 m
+_OFF = 10.0  # [m] from a polyline, beyond which a vehicle does not follow it yet
+_MOVES = 2.0  # [m/s]
+_TOWARDS = math.cos(math.radians(20.0))  # of the angle to the way to a point, at least
 
 
 def polyline_length(points: Sequence[Coordinates]) -> float:
@@ -81,7 +84,8 @@ def segment_distance(point: Coordinates, start: Coordinates, end: Coordinates) -
 
 
 def points_passed(position: Coordinates, points: Sequence[Coordinates],
-                  start: Coordinates | None = None) -> int:
+                  start: Coordinates | None = None,
+                  velocity: Coordinates | None = None) -> int:
     """Count the points of a polyline that a vehicle which follows it has passed.
 
     A point is passed when the spot of the polyline that is nearest to the vehicle lies after it.
@@ -93,6 +97,9 @@ def points_passed(position: Coordinates, points: Sequence[Coordinates],
         points: detour points in order, and the goal [m].
         start: where the vehicle began [m]. Without it a vehicle still before the first point is
             projected on the later segments, and may count as having passed that point.
+        velocity: of the vehicle [m/s]; None: unknown. More than 10 m off the polyline, as after
+            an upload in which it flew elsewhere, it has passed no point to which it flies, and
+            none at rest.
 
     Returns:
         0 to len(points) - 1: `points[n:]` are still to be flown. 0 where there are no points, or
@@ -105,4 +112,16 @@ def points_passed(position: Coordinates, points: Sequence[Coordinates],
     if k is None:
         return 0
     metres = segment_fraction(position, line[k], line[k + 1]) * math.dist(line[k], line[k + 1])
-    return max(0, k + (metres > _TIE) - (start is not None))
+    passed = max(0, k + (metres > _TIE) - (start is not None))
+    if velocity is None or distances[k] <= _OFF:
+        return passed
+    if math.hypot(*velocity) < _MOVES:
+        return 0
+    towards = [_cosine(velocity, position, point) for point in points[:passed + 1]]
+    return towards.index(max(towards)) if max(towards) >= _TOWARDS else passed
+
+
+def _cosine(velocity: Coordinates, position: Coordinates, point: Coordinates) -> float:
+    """Cosine of the angle between a velocity and the way to a point elsewhere."""
+    along = math.fsum(v * (q - p) for v, p, q in zip(velocity, position, point, strict=True))
+    return along / (math.hypot(*velocity) * math.dist(position, point))

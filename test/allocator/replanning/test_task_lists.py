@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from uav_task_alloc.allocator.records import UavList
+from uav_task_alloc.allocator.records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.task_lists import build_task_list, planned_legs
 from uav_task_alloc.model import Leg, Plan, Task, Uav
 
@@ -31,7 +31,7 @@ class FakePaths:
     def why_no_leg(self, a, b):
         return ''
 
-    def rest(self, position, leg, goal):
+    def rest(self, position, leg, goal, velocity=None):
         points = (position, *leg.via, goal)
         return sum(map(math.dist, points, points[1:])) if self.clear(*points) else None
 
@@ -77,3 +77,11 @@ def test_a_published_leg_that_is_cut_is_replaced():
     published, _ = build(FakePaths(), legs=planned_legs(plan))
     new, _ = build(FakePaths(cut=[via]), published=published)
     assert new.stops[0].leg.via == ()
+
+
+@pytest.mark.parametrize(('detour', 'kept'), [(10.0, True), (40.0, False)])
+def test_a_leg_under_way_is_kept_unless_the_uav_would_turn_back(detour, kept):
+    via = ((-detour, 0.0, UAV.position[2]),)
+    published = UavList('a', 1, stops=(ListStop(TASKS[0], Leg(via, 0.0), 0.0),))
+    new, _ = build_task_list(UAV, TASKS[:1], False, {}, published, FakePaths(), keep=True)
+    assert new.stops[0].leg.via == (via if kept else ())

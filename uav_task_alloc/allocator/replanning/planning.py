@@ -276,7 +276,8 @@ def way_to_place_is_clear(world: World, each: UavList) -> bool:
     """
     record, place = world.uav_record(each.uav), each.waiting_place
     return record is not None and place is not None and world.paths().rest_of_leg(
-        record.report.position, Leg(each.end_via[:-1], 0.0), place) is not None
+        record.report.position, Leg(each.end_via[:-1], 0.0), place,
+        record.report.velocity) is not None
 
 
 def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], returns: bool,

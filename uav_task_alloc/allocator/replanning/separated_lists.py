@@ -159,7 +159,7 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
             flight.on_ground or flight.climbing or own.waits)
         along = bool(stop.task.path) and (stands or not under_way)  # the path is another leg
         line = (*stop.leg.via, stop.entry) if along else stop.line
-        ahead = line[points_passed(place, line):] if under_way else line
+        ahead = line[flight.passed(line):] if under_way else line
         served = stop.served if under_way else 0.0
         begins = stop.begin_after - stamp
         climbs = takes_off or (k == 0 and flight.climbing)
@@ -195,7 +195,7 @@ def _leg_to_wait(each: UavList, flight: UavFlight) -> list[FlightLeg]:
     if each.waiting_place is None or flight.on_ground or (
             math.dist(place, each.waiting_place) < _AT_PLACE):
         return []
-    ahead = line[points_passed(place, line):]
+    ahead = line[flight.passed(line):]
     return [FlightLeg((place, *ahead), movable=False, may_wait=False)]
 
 

@@ -14,6 +14,7 @@ from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 
 _START, _HOME = '', '~'  # neither is a task id
+_BACK = 30.0  # [m] longer than a fresh leg is one under way to which the UAV would turn back
 _WORTH = 1.0  # [m] that a path must be shorter, at least, to replace a published one
 LegKey = tuple[str, str, str]  # UAV (if it starts or returns home there), stop before, stop
 
@@ -46,8 +47,8 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
         published: list in force, whose legs are kept while they are safe.
         paths: around the present zones.
         flight: of the UAV, for the times; None: as planned, from now.
-        keep: the leg under way stays while it is safe, whatever its length: its heights keep
-            UAVs apart.
+        keep: the leg under way stays while it is safe, also where a fresh one is a little
+            shorter: its heights keep UAVs apart.
         backward: ids of the tasks whose paths are flown from the last point.
 
     Returns:
@@ -55,12 +56,12 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
     """
     stops: list[ListStop] = []
     unreachable: dict[str, str] = {}
-    before, place = _START, uav.position
+    before, place, velocity = _START, uav.position, flight.velocity if flight else None
     for task in tasks:
         new = ListStop(task, Leg((), 0.0), 0.0, reversed=task.id in backward)
         old = _published_stop(published, before, new)
         leg = _steady_leg(old, before == _START, place, paths, _planned_leg(
-            legs, _leg_key(uav.id, before, task.id), place, new.entry, paths), keep)
+            legs, _leg_key(uav.id, before, task.id), place, new.entry, paths), keep, velocity)
         if leg is None or not paths.clear(*new.way):
             why = paths.why_no_leg(place, new.entry) if leg is None else ''
             unreachable[task.id] = f'no safe path for {uav.id}' + (f': {why}' if why else '')
@@ -68,7 +69,8 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
         stops.append(replace(new, leg=leg, begin_after=old.begin_after if old else 0.0))
         before, place = task.id, new.exit
     distance = math.fsum(stop.length for stop in stops)
-    home = _leg_home(uav, before, place, legs, published, paths) if returns else None
+    home = _leg_home(uav, before, place, legs, published, paths,
+                     velocity) if returns else None
     timed = timed_stops(stops, flight or UavFlight.of(uav))
     return replace(published, stops=timed, returns=home is not None,
                    end_via=home.via if home else (),
@@ -76,10 +78,10 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
 
 
 def _leg_home(uav: Uav, before: str, place: Point, legs: Mapping[LegKey, Leg],
-              published: UavList, paths: SafePaths) -> Leg | None:
+              published: UavList, paths: SafePaths, velocity: Point | None) -> Leg | None:
     goal = uav.home or uav.position
     if before == _START and published.returns and not published.stops:  # perhaps under way
-        metres = paths.rest_of_leg(place, Leg(published.end_via, 0.0), goal)
+        metres = paths.rest_of_leg(place, Leg(published.end_via, 0.0), goal, velocity)
         if metres is not None:
             return Leg(published.end_via, metres)
     return _planned_leg(legs, _leg_key(uav.id, before, _HOME), place, goal, paths)
@@ -99,7 +101,7 @@ def _planned_leg(legs: Mapping[LegKey, Leg], key: LegKey, a: Point, b: Point,
 
 
 def _steady_leg(stop: ListStop | None, first: bool, place: Point, paths: SafePaths,
-                fresh: Leg | None, keep: bool) -> Leg | None:
+                fresh: Leg | None, keep: bool, velocity: Point | None) -> Leg | None:
     """The published leg while it is safe and not longer by the margin; else the fresh one."""
     if stop is None:
         return fresh
@@ -107,15 +109,17 @@ def _steady_leg(stop: ListStop | None, first: bool, place: Point, paths: SafePat
     if first and stop.task.path and way_ahead(place, stop):
         return Leg((), 0.0)
     if first:
-        metres = paths.rest_of_leg(place, old, stop.entry)
+        metres = paths.rest_of_leg(place, old, stop.entry, velocity)
     else:
         metres = old.length if paths.leg_clear(place, *old.via, stop.entry) else None
     if metres is None:
         return fresh
-    keep = keep and first
-    if not keep and fresh is not None and fresh.length + _WORTH < metres * (1.0 - paths.margin):
-        return fresh
-    return Leg(old.via, metres)
+    if fresh is None:
+        return Leg(old.via, metres)
+    if keep and first:
+        return fresh if fresh.length + _BACK < metres else Leg(old.via, metres)
+    shorter = fresh.length + _WORTH < metres * (1.0 - paths.margin)
+    return fresh if shorter else Leg(old.via, metres)
 
 
 def _published_stop(published: UavList, before: str, new: ListStop) -> ListStop | None:

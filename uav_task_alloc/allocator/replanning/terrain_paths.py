@@ -87,12 +87,13 @@ class TerrainPaths(ZonePaths):
             self._kept[points] = self._legs.keeps(points)
         return self._kept[points] and self.clear(*points)
 
-    def rest_of_leg(self, position: Point, leg: Leg, goal: Point) -> float | None:
+    def rest_of_leg(self, position: Point, leg: Leg, goal: Point,
+                    velocity: Point | None = None) -> float | None:
         """Return the length [m] still to fly of a leg; None if a zone or the ground cuts it."""
-        ahead = leg.via[points_passed(position, (*leg.via, goal)):]
+        ahead = leg.via[points_passed(position, (*leg.via, goal), velocity=velocity):]
         if not self._legs.keeps((position, *ahead, goal), _IN_FLIGHT, _UPRIGHT):
             return None
-        return self.rest(position, leg, goal)
+        return self.rest(position, leg, goal, velocity)
 
     # what legs over terrain ask of zones
 

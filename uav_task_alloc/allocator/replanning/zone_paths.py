@@ -104,13 +104,14 @@ class ZonePaths:
         """Return whether a leg with these points is safe: it enters no zone."""
         return self.clear(*points)
 
-    def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
+    def rest(self, position: Point, leg: Leg, goal: Point,
+             velocity: Point | None = None) -> float | None:
         """Return the length [m] still to fly of a leg under way; None if a zone cuts it.
 
         At a point of the leg it is not known whether the vehicle has passed it: either will do.
         """
         line = (*leg.via, goal)
-        passed = points_passed(position, line)
+        passed = points_passed(position, line, velocity=velocity)
         for n in (passed, passed + 1, passed - 1):
             if n != passed and not (0 <= n < len(line) and math.dist(
                     position, line[min(n, passed)]) <= _AT_POINT):
@@ -119,9 +120,10 @@ class ZonePaths:
                 return polyline_length((position, *line[n:]))
         return None
 
-    def rest_of_leg(self, position: Point, leg: Leg, goal: Point) -> float | None:
+    def rest_of_leg(self, position: Point, leg: Leg, goal: Point,
+                    velocity: Point | None = None) -> float | None:
         """Return the length [m] still to fly of a leg to a task; None if a zone cuts it."""
-        return self.rest(position, leg, goal)
+        return self.rest(position, leg, goal, velocity)
 
 
 def _boxes(obstacles: Obstacles) -> tuple[Floats, Floats]:

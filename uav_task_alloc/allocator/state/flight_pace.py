@@ -207,6 +207,15 @@ class UavFlight:
         along = sum(v * d for v, d in zip(self.velocity, way, strict=True)) / length
         return min(1.0, max(0.0, along * full / length))
 
+    def passed(self, points: Sequence[Point], start: Point | None = None) -> int:
+        """Count the points of its way that it has passed; see `points_passed`.
+
+        Args:
+            points: of the way and its end [m] ENU.
+            start: [m] where the way began; None: unknown.
+        """
+        return points_passed(self.position, points, start, self.velocity)
+
     @classmethod
     def of(cls, uav: Uav, stamp: float = 0.0) -> UavFlight:
         """Return the flight of a UAV as planned.
@@ -331,7 +340,7 @@ def _leg_seconds(stop: ListStop, flight: UavFlight, place: Point, start: Point |
         above = (place[0], place[1], max(place[2], top))
         return (flight.pace.takeoff * flight.on_ground + flight.pace.seconds((place, above))
                 + flight.pace.from_stop((above, *leg)))
-    rest = leg[points_passed(place, leg, start):]
+    rest = leg[flight.passed(leg, start):]
     return flight.pace.from_stop((place, *rest), flight.share(rest[0]))
 
 

@@ -45,10 +45,15 @@ class SafePaths(Protocol):
     def leg_clear(self, *points: Point) -> bool:
         """Return whether a leg enters no zone and keeps clear of the ground."""
 
-    def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
-        """Return the length [m] still to fly of a leg under way; None if a zone cuts it."""
+    def rest(self, position: Point, leg: Leg, goal: Point,
+             velocity: Point | None = None) -> float | None:
+        """Return the length [m] still to fly of a leg under way; None if a zone cuts it.
 
-    def rest_of_leg(self, position: Point, leg: Leg, goal: Point) -> float | None:
+        `velocity` as in `points_passed`.
+        """
+
+    def rest_of_leg(self, position: Point, leg: Leg, goal: Point,
+                    velocity: Point | None = None) -> float | None:
         """As `rest`, of a leg to a task or home; None also if it comes too near to the ground."""
 
 
