@@ -213,6 +213,9 @@ class UavFlight:
         Args:
             points: of the way and its end [m] ENU.
             start: [m] where the way began; None: unknown.
+
+        Returns:
+            0 to len(points) - 1.
         """
         return points_passed(self.position, points, start, self.velocity)
 
