@@ -109,6 +109,7 @@ class ZonePaths:
         """Return the length [m] still to fly of a leg under way; None if a zone cuts it.
 
         At a point of the leg it is not known whether the vehicle has passed it: either will do.
+        Off the leg its `velocity` shows to which point it flies, see `points_passed`.
         """
         line = (*leg.via, goal)
         passed = points_passed(position, line, velocity=velocity)

@@ -54,7 +54,10 @@ class SafePaths(Protocol):
 
     def rest_of_leg(self, position: Point, leg: Leg, goal: Point,
                     velocity: Point | None = None) -> float | None:
-        """As `rest`, of a leg to a task or home; None also if it comes too near to the ground."""
+        """As `rest`, of a leg to a task or home; None also if it comes too near to the ground.
+
+        `velocity` as in `points_passed`.
+        """
 
 
 MakeSafePaths = Callable[[Sequence[ThreatZone], AllocatorParams], SafePaths]
