@@ -21,6 +21,22 @@ def test_a_set_current_is_not_sent_again_once_a_later_item_is_reported(
     assert bool(done) is not sent_again
 
 
+@pytest.mark.parametrize(('before', 'shows'), [(1, False), (0, True)])
+def test_an_item_that_was_current_before_needs_the_ack_of_its_set_current(before, shows):
+    executor, done = flying('ardupilot', 'ABCD').executor(), []
+    telemetry, sender = executor.telemetry, executor.sender
+    telemetry.current = before
+    assert sender.set_current(1, 100.0, done.append)
+    telemetry.current, telemetry.current_at = 1, 100.5
+    assert bool(sender.finish(101.5)) is not shows
+    if not shows:
+        ack = d.MAVLink_command_ack_message(d.MAV_CMD_DO_SET_MISSION_CURRENT, 0)
+        ack.get_srcSystem, ack.get_srcComponent = (lambda: 1), (lambda: 1)
+        sender.receive(ack)
+        assert sender.finish(101.6) is None
+    assert done
+
+
 def test_a_command_is_repeated_only_after_all_messages_of_a_stall():
     executor, done = flying('px4', 'ABCD').executor(), []
     telemetry, sender = executor.telemetry, executor.sender

@@ -24,6 +24,7 @@ _CLIMB_LIMIT = 120.0  # [s] for a take-off
 _REACHED_HEIGHT = 0.9  # fraction of the commanded height
 _RETRY, _RETRIES = 10.0, 5  # [s] after a failure that may be temporary
 _SLOW_RETRY = 60.0  # [s] after more failures, without limit
+_SET_ATTEMPTS = 5  # to set an item as current that only the ACK can show to be set
 _REFUSAL_DELAY = 5.0  # [s] of arming attempts before a refusal is logged: the reason may follow
 
 _Completion = Callable[[float], None]
@@ -224,9 +225,13 @@ class CommandSender:
             return telemetry.current == seq or (before is not None and seq < telemetry.current
                                                 and (before <= seq or telemetry.plan_id != plan))
 
+        # an item that was reported before is reported without the command too: it needs its ACK
+        reported = before == seq
         message = Command(_SET_CURRENT, self._peer.set_current(seq), executed)
-        command = Command(_SET_CURRENT, self._peer.command(
-            d.MAV_CMD_DO_SET_MISSION_CURRENT, seq), executed, attempts=2, fallback=message)
+        command = Command(
+            _SET_CURRENT, self._peer.command(d.MAV_CMD_DO_SET_MISSION_CURRENT, seq),
+            lambda: not (reported and telemetry.plan_id == plan) and executed(),
+            attempts=_SET_ATTEMPTS if reported else 2, fallback=message)
         return self.start(command if self._profile.jump_command else message, now, completion)
 
     def take_off(self, height: float, wanted: Callable[[], bool], now: float) -> NextMessages:
