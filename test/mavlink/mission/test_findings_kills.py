@@ -268,7 +268,7 @@ def items_at(*places):
 def test_a_position_of_long_after_a_reached_counts_where_the_current_items_agree(
         metres, seconds, after, known):
     telemetry = SimpleNamespace(has_position=False, position=(metres, 0.0, 50.0), speed=10.0,
-                                in_mission=True, mission_state=d.MISSION_STATE_ACTIVE)
+                                in_mission=True, mission_state=d.MISSION_STATE_ACTIVE, total=3)
     reports = UnreadReports(telemetry, PositionHistory(), repeats=False)
     reports.note_current(0, 0.0, 1, located=False)
     reports.note_reached(0, 1.0, 2)
@@ -343,7 +343,7 @@ def test_a_mission_taken_before_the_first_position_after_a_reboot_counts_by_its_
 def reports_of(place, repeats):
     """Reports of a vehicle in mission mode that stands at a place."""
     telemetry = SimpleNamespace(has_position=True, position=place, speed=0.0, in_mission=True,
-                                mission_state=d.MISSION_STATE_ACTIVE)
+                                mission_state=d.MISSION_STATE_ACTIVE, total=3)
     history = PositionHistory()
     history.add(PositionSample(1.0, place, (0.0, 0.0, 0.0)), True, 1.0, 1)
     return UnreadReports(telemetry, history, repeats)

@@ -232,7 +232,8 @@ class AuthorityRecord:
     # 0..1, at its own landing or on its way down over its home, while it may start again
     landed_battery: float | None = None
     pieces: tuple[PieceMark, ...] = ()  # that are partly flown
-    ahead: tuple[TaskMark, ...] = ()  # the next tasks on board, with the one being flown; at 0 s
+    # the next tasks on board, with the one being flown; at 0 s, flown: passed, and seen there
+    ahead: tuple[TaskMark, ...] = ()
 
 
 class Authority:

@@ -231,7 +231,7 @@ class GroundStation:
         """Complete tasks of a list that another UAV has flown while the bridge was down."""
         executors = [(s.uav_id, s.executor) for s in self.sessions.values()]
         known: list[tuple[TaskList | None, int]] = [
-            (executor.onboard.tasks, len(executor.onboard.resume.flown_items(now)))
+            (executor.onboard.tasks, executor.onboard.resume.flown_count(now))
             for _, executor in executors]
         if known == self._compared or not any(flown for _, flown in known):
             return

@@ -124,7 +124,7 @@ class MissionEvidence:
         tasks, left = progress.passed_in_flight
         if not tasks or progress.current is None:
             return ()
-        seen = progress.seen_passed()
+        seen = {item.task for item in progress.seen_passed()}
         held = [(n, item) for n, item in enumerate(progress.items[:progress.current])
                 if item.task in tasks]
         return () if not held else (held[0][0], held[-1][0] + 1, left, *(
@@ -136,15 +136,25 @@ class MissionEvidence:
         return progress.coverage.marks(progress.completed)
 
     def ahead(self, current: int | None) -> tuple[TaskMark, ...]:
-        """The next tasks on board, at most _AHEAD, from `current` of `mission_position` on."""
-        held = self._onboard.progress.items
-        if current is None:
-            return ()
-        if self._ahead[0] is not held or self._ahead[1] != current:
+        """Return the next tasks on board, at most _AHEAD, after those that it was seen to pass.
+
+        Those are flown: their REACHED may follow, and no index would name them to a restarted
+        bridge that finds another mission on board.
+
+        Args:
+            current: of `mission_position`; None: it is not known.
+        """
+        held, seen = self._onboard.progress.items, self._onboard.progress.seen_passed()
+        if current is not None and (self._ahead[0] is not held or self._ahead[1] != current):
             marks = [TaskMark(item.task, *item.position, 0.0, False) for item in held[current:]
                      if item.completes and item.position is not None]
             self._ahead = held, current, tuple(marks[:_AHEAD])
-        return self._ahead[2]
+        ahead = self._ahead[2] if current is not None else ()
+        if not seen:
+            return ahead
+        passed = [TaskMark(item.task, *item.place, 0.0, True) for item in seen
+                  if item.place is not None and not item.along]
+        return (*passed, *(mark for mark in ahead if all(mark.task != p.task for p in passed)))
 
     def uploading(self) -> tuple[int, ...]:
         """Checksum of a mission that may be stored next, and index of its first item; ()."""

@@ -299,7 +299,7 @@ class OnboardMission:
 
     def complete_flown(self, now: float) -> None:
         """Complete the tasks that the vehicle has flown while the bridge was down."""
-        flown = len(self.resume.flown_items(now))
+        flown = self.resume.flown_count(now)
         if flown and self.tasks and (self.tasks, flown) != self._completed_for:
             self._completed_for = self.tasks, flown
             self.progress.complete_offline(self.resume.flown_tasks(

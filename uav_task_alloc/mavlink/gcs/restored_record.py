@@ -27,6 +27,9 @@ def restore_record(record: AuthorityRecord | None, onboard: OnboardMission,
         resume.recorded = record.mission, record.current, record.arrived
         resume.passed, onboard.progress.coverage.recorded = record.passed, True
         resume.ahead = {mark.task: mark[1:4] for mark in record.ahead}
+        for mark in record.ahead:
+            if mark.flown:
+                resume.seen_passed.add(mark.task, mark[1:4])
         for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
             t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
             resume.note_seen(PositionSample(t, (x, y, z), (east, north, up)))

@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
+from uav_task_alloc.mavlink.gcs.seen_passed import SeenPassed
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReached, UnreadReports
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
@@ -62,6 +63,7 @@ class Resume:
         self.unflown: dict[str, Point] = {}  # [m] ENU, by task; skipped by another station
         self.reported: set[str] = set()  # flown and reported by the previous run
         self.ahead: dict[str, Point] = {}  # [m] ENU, by id; the next tasks of the previous run
+        self.seen_passed = SeenPassed()
         # checksum of the mission, current item and whether it was seen there, of the previous run
         self.recorded: tuple[int | None, int | None, bool] = None, None, False
         self.passed: tuple[int, ...] = ()  # see `AuthorityRecord`
@@ -107,7 +109,7 @@ class Resume:
         self._epoch, self._located_at = -1, 0  # epoch and seq of the location
         self._until = -math.inf  # [s]
         self._reached: tuple[Item, ...] = ()  # those of `_flown` with a REACHED
-        self._known_reached = 0  # how many had one at the last call of `flown_items`
+        self._known_reached = 0  # how many had one at the last call of `_flown_items`
         self._flown: tuple[Item, ...] = ()  # of missions that were replaced
 
     def note_current(self, seq: int, now: float, frame: int) -> None:
@@ -220,6 +222,9 @@ class Resume:
         if not self.current_unreliable:
             passed = self._unread.passed(self._placed(held), self._home_of(held))
             self._credit(tuple(held[n] for n in sorted(passed)), now)
+        if self._telemetry.airborne and self.recorded[0] is None:  # no file: taken at the start
+            flown = held[:self._unread.flown_first(len(held))]
+            self._flown, self._until = self._flown + flown, now + MAX_AGE
         self._progress.begin(held, None, now)
         self._epoch, self._located_at = self._progress.epoch, 0
 
@@ -310,7 +315,11 @@ class Resume:
         here = self._flown_here()
         self._flown, self._reached = self._flown + here, self._reached + self._reached_of(here)
 
-    def flown_items(self, now: float) -> tuple[Item, ...]:
+    def flown_count(self, now: float) -> int:
+        """How many flown items and tasks are known; it changes where `flown_tasks` may."""
+        return len(self._flown_items(now)) + self.seen_passed.count(now)
+
+    def _flown_items(self, now: float) -> tuple[Item, ...]:
         """Flown items that were not reported; none when no task can be credited any more."""
         here = self._flown_here()
         if not here and not self._flown:
@@ -323,10 +332,11 @@ class Resume:
         return (*self._flown, *here) if now < self._until + _NAMED_AGE * bool(self.ahead) else ()
 
     def flown_tasks(self, tasks: Iterable[Task], now: float) -> tuple[Task, ...]:
-        """The given tasks that are among the flown items."""
-        flown = self.flown_items(now)
+        """The given tasks that are among the flown items, or were seen passed before."""
+        tasks = tuple(tasks)
+        flown, seen = self._flown_items(now), self.seen_passed.among(tasks, now)
         if not flown:
-            return ()
+            return seen
         named = [task for task in tasks
                  if now < self._until or self.ahead.get(task.id) == task.position]
         found = []
@@ -336,7 +346,7 @@ class Resume:
             found += [stop.task for stop in stops if stop.task.id in ends and any(
                 alike(ends[stop.task.id], other) and self._is_flown(stop.task, other)
                 and self._comes_along(stop, other) for other in flown)]
-        return tuple(dict.fromkeys(found))
+        return tuple(dict.fromkeys((*seen, *found)))
 
     def _comes_along(self, stop: MissionStop, last: Item) -> bool:
         """Whether the items before the last one of a way are of that way; ways share points."""

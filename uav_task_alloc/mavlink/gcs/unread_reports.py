@@ -30,6 +30,7 @@ class UnreadCurrent(NamedTuple):
     frame: int  # its number
     flying: bool  # in mission mode, so that it is of the mission that is flown
     complete: bool  # with the report that the mission is flown to its end
+    total: int | None = None  # items of the mission that it reported to fly; None: it did not
 
 
 @dataclass(slots=True)
@@ -96,11 +97,17 @@ class UnreadReports:
         if not located and len(self.currents) < _MAX_CURRENTS:
             self.currents.append(UnreadCurrent(
                 seq, now, frame, self._telemetry.in_mission,
-                self._telemetry.mission_state == d.MISSION_STATE_COMPLETE))
+                self._telemetry.mission_state == d.MISSION_STATE_COMPLETE, self._count_flown()))
         for reached in self._reached:
             if frame > reached.frame:
                 reached.current_after = max(seq, reached.current_after or 0)
         self._place(now)
+
+    def _count_flown(self) -> int | None:
+        """How many items the mission has that the newest MISSION_CURRENT reports to be flown."""
+        telemetry = self._telemetry
+        return telemetry.total if telemetry.in_mission and (
+            telemetry.mission_state == d.MISSION_STATE_ACTIVE) else None
 
     def note_reached(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_ITEM_REACHED.
@@ -164,6 +171,20 @@ class UnreadReports:
             Indices of those that the positions show to be flown.
         """
         return _passed(self.currents, self._positions, held, home)
+
+    def flown_first(self, count: int) -> int:
+        """Return the item that a mission of so many items was flying when this run began.
+
+        Args:
+            count: number of items on board, without home.
+
+        Returns:
+            Its index; 0: not known. A report that was sent before the first frame of this run may
+            be of a mission that was replaced since.
+        """
+        first = self._telemetry.frames.first
+        return next((each.seq for each in self.currents
+                     if each.total == count and each.frame > first), 0)
 
     def take_passed_before(self, held: tuple[Item, ...], home: Point | None) -> set[int]:
         """Take the items that it was seen to pass before it was restarted.

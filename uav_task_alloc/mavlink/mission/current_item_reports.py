@@ -37,6 +37,14 @@ class CurrentItemReports:
         self._setting = self.reported = None
         self.went_back = False
 
+    def note_read(self, current: int | None) -> None:
+        """Note that the mission of this epoch was found on board.
+
+        Args:
+            current: the item reported for it; None: not known, or it is flown to the end.
+        """
+        self.reported, self.last_frame = current, None
+
     def clear(self) -> None:
         """Reset: the mission on board is unknown."""
         self._set = self.last_frame = self.reported = None

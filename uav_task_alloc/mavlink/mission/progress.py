@@ -156,9 +156,9 @@ class ProgressTable:
         """See `CurrentItem.passed_in_flight`."""
         return self._moves.passed_in_flight()
 
-    def seen_passed(self) -> frozenset[str]:
-        """Return the pending tasks at which the vehicle was seen."""
-        return frozenset(item.task for item in self._moves.passed.seen())
+    def seen_passed(self) -> tuple[Item, ...]:
+        """Return the items of pending tasks at which the vehicle was seen, of any epoch."""
+        return self._moves.passed.seen()
 
     def may_end(self, now: float) -> bool:
         """Whether the mission may be at its end, or was when it was just replaced."""
@@ -193,7 +193,7 @@ class ProgressTable:
         self._reached.begin()
         self._moves.begin(None if read or start == len(items) else start, now)
         if read:
-            self._moves.reports.last_frame = None
+            self._moves.reports.note_read(start if since is None and start != len(items) else None)
         known_since = self.path.newest if since is None else since
         epoch.since = epoch.begin = -math.inf if read and since is None else known_since
         epoch.taken = -math.inf if since is None else since

@@ -50,6 +50,11 @@ class FrameLog:
         return number
 
     @property
+    def first(self) -> int:
+        """The number of the frame received first, of those that are kept; 0 where none was."""
+        return self._order[0] if self._order else 0
+
+    @property
     def received_at(self) -> float:
         """When [s] a frame was received last; inf where none was."""
         return self._at if self._known else math.inf

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A task that was passed, and still to be judged, when its bridge or its mission was replaced."""
+import pytest
+from authority_bench import ARDUPILOT, MODES, flying
+from evidence_bench import Flight
+from findings_bench import drop_messages, flown_once_each
+from flight_bench import places
+from mission_bench import task_list
+
+
+def passed_a(kind, names):
+    """A vehicle that has just passed A, whose REACHED is lost, and may still be late."""
+    bench = flying(kind, names)
+    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: True)
+    assert bench.run(lambda: bench.onboard().progress.pending, 60.0)
+    assert places(bench) == ['A']
+    return bench
+
+
+@ARDUPILOT
+def test_a_task_seen_passed_is_known_after_a_kill_while_its_mission_is_replaced(kind):
+    bench = passed_a(kind, 'ABC')
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT', lambda m: m.seq > 1)
+    bench.assign(task_list('CA', 2))
+    assert bench.run(lambda: len(bench.vehicles[1].flight.items) < 4, 4.0)
+    bench.run(limit=0.5)
+    assert bench.onboard().progress.pending == {'A'}
+    bench.kill_and_restart(0.0)
+    bench.line.tampers.clear()
+    bench.assign(task_list('CAB', 3))
+    assert bench.run(lambda: bench.completed() == ['A'], 3.0)
+    bench.assign(task_list('CB', 4))
+    flown_once_each(bench, 'ABC')
+
+
+@ARDUPILOT
+def test_a_task_passed_before_a_pilot_took_it_is_known_to_a_bridge_without_a_file(kind):
+    bench = passed_a(kind, 'ABC')
+    bench.kill_and_restart(0.0, store=False)
+    drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: True)
+    bench.run(limit=1.0)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    bench.run(limit=2.0)
+    bench.line.tampers.clear()
+    bench.assign(task_list('ABC', 2))
+    bench.run(limit=5.0)
+    bench.hand_over()
+    flown_once_each(bench, 'ABC')
+
+
+@pytest.mark.parametrize(('start', 'x', 'known'), [
+    (1, 100.0, True), (1, 60.0, False), (0, 100.0, False)])
+def test_a_reached_of_the_last_item_of_a_mission_found_on_board_needs_no_later_current(
+        start, x, known):
+    flight, other = Flight(), Flight()
+    other.begin(A=50.0, B=100.0)
+    flight.table.begin(other.table.items, start, flight.now, read=True)
+    flight.fly_to(x)
+    flight.reached(1)
+    flight.stay(1.0)
+    assert ('B' in flight.table.completed) is known
