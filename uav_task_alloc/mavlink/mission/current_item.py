@@ -57,6 +57,8 @@ class CurrentItem:
         # item and when [s] a report of another mode set it back, as that of a restart does
         self.set_back_from: tuple[int, float] | None = None
         self._after_skipped: int | None = None  # the item after those that were skipped
+        # number of the newest frame at the first report since the mission is flown to its end
+        self._finished_frame: int | None = None
 
     def begin(self, start: int | None, now: float) -> None:
         """Begin an epoch at an item that the vehicle will report; None: it is not known."""
@@ -178,9 +180,22 @@ class CurrentItem:
         reports.note(seq, frame)
         known = None if not flying or epoch.current is None else (
             min(epoch.current, len(epoch.items) - 1))
+        restarted = self._flies_after_end(frame) or restarted
         if reports.was_set_back(seq, now, known) or (
                 restarted and known is not None and seq < known and not reports.awaits_set):
             self._fly_from(seq, now)
+
+    def _flies_after_end(self, frame: int | None) -> bool:
+        """Whether a report was sent after the mission had been flown to its end.
+
+        The first such report may have been sent before that.
+        """
+        if not self._epoch.finished:
+            self._finished_frame = None
+            return False
+        if self._finished_frame is None:
+            self._finished_frame = self._frames.newest
+        return frame is not None and frame > self._finished_frame
 
     def _fly_from(self, seq: int, now: float) -> None:
         """Set the current item, which may be flown since before the message arrived."""

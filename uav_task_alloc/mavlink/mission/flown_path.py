@@ -163,7 +163,8 @@ class FlownPath:
             radius or _DEFAULT_RADIUS) + CLOSE + _CURVE * time * time
 
     def could_have_flown(self, chain: Sequence[Point], then: Point | None, holds: float,
-                   since: float, anywhere: bool = False, home: Point | None = None) -> bool:
+                         since: float, anywhere: bool = False, home: Point | None = None,
+                         until: float = math.inf) -> bool:
         """Whether it can have flown through `chain` in a gap of the samples.
 
         Args:
@@ -173,6 +174,7 @@ class FlownPath:
             since: vehicle time [s].
             anywhere: it was not bound for the next point any more.
             home: where it returns to from the last point, at a height that is not known; ENU [m].
+            until: vehicle time [s]; a gap that begins later does not count.
 
         Returns:
             True where a gap is long enough and the sample after it is of a vehicle that flies the
@@ -180,7 +182,8 @@ class FlownPath:
         """
         fastest, samples = self.fastest, self._since(since)
         for (a, b), c in zip(pairwise(samples), (*samples[2:], None), strict=False):
-            if b.t - a.t > GAP and polyline_length((a.position, *chain, b.position)) <= (
+            if b.t - a.t > GAP and a.t <= until and polyline_length(
+                    (a.position, *chain, b.position)) <= (
                     _longest_way(a, b, 1.1 * fastest, b.t - a.t - 0.8 * holds)) + 10.0 and (
                     anywhere or (_on_leg(b.position, (a.position, *chain), then, home)
                     and (home is not None or (_moves_along(b, chain[-1], then, fastest)

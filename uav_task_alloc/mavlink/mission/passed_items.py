@@ -148,7 +148,7 @@ class PassedItems:
                     [item.position for item in flown if item.position is not None], then,
                     math.fsum(item.params[0] for item in flown), claim.since,
                     anywhere=left_unseen and not claim.skips,
-                    home=claim.home if last else None):
+                    home=claim.home if last else None, until=claim.until):
                 return True
         return False
 

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gaps that are no evidence, and ends that begin again; found by flights at random."""
+import pytest
+from evidence_bench import SPEED, Flight
+
+
+@pytest.mark.parametrize(('left_at', 'known'), [(97.0, False), (99.0, True)])
+def test_a_gap_after_the_mission_was_left_is_no_evidence(left_at, known):
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0)
+    flight.table.note_in_mission(flight.frame())
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(30.0)
+    flight.lost = True
+    flight.stay(3.0, SPEED)
+    flight.lost = False
+    flight.fly_to(left_at)
+    flight.table.note_other_mode(flight.now)
+    flight.stay(0.2, 5.0 * (100.0 - left_at))
+    flight.lost = True
+    flight.stay(14.0)
+    flight.lost = False
+    flight.stay(1.0)
+    flight.table.note_current(1, flight.now, False, flight.frame())
+    flight.stay(8.0)
+    assert ('A' in flight.table.completed) is known
+
+
+@pytest.mark.parametrize(('reports', 'current'), [(1, 2), (2, 0)])
+def test_a_mission_that_begins_again_after_its_end_is_known_by_the_second_report(reports, current):
+    flight = Flight()
+    flight.begin(A=100.0, B=200.0)
+    flight.table.note_in_mission(flight.frame())
+    for seq, x in enumerate((100.0, 200.0)):
+        flight.table.note_current(seq, flight.now, True, flight.frame())
+        flight.fly_to(x)
+        flight.reached(seq)
+    assert flight.table.finished
+    for _ in range(reports):
+        flight.stay(1.0)
+        flight.table.note_current(0, flight.now, True, flight.frame())
+    assert flight.table.current == current
