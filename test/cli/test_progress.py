@@ -66,6 +66,30 @@ def test_the_first_ctrl_c_stops_the_solver_and_the_second_interrupts():
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_ctrl_c_amid_a_write_to_the_terminal_only_stops_the_solver(tmp_path):
+    class Interrupted(io.BufferedWriter):
+        """A stream that cannot be written to while it is written to, as that of stderr."""
+        writing = False
+
+        def write(self, text):
+            assert not self.writing, 'reentrant call'
+            self.writing = True
+            if b'left' in text:
+                signal.raise_signal(signal.SIGINT)
+            self.writing = False
+            return super().write(text)
+
+    now, file = [0.0], tmp_path / 'shown'
+    with file.open('wb', buffering=0) as raw, io.TextIOWrapper(
+            Interrupted(raw), write_through=True) as stream:
+        stream.isatty = lambda: True
+        with SolveProgress(10.0, stream, lambda: now[0]) as progress:
+            assert not progress.stop()
+            now[0] = 2.0
+            assert progress.stop()
+    assert 'stopping; Ctrl-C again discards the plan\n' in file.read_text()
+
+
 def test_ctrl_c_at_a_terminal_prints_and_writes_the_best_plan_so_far(tmp_path):
     ours, theirs = pty.openpty()
     out = tmp_path / 'plan.json'

@@ -2,8 +2,10 @@
 """Progress of long runs on stderr: the line of a solve that Ctrl-C ends, and plain log lines."""
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import TextIO
 
@@ -76,8 +78,10 @@ class SolveProgress:
         if self.interrupted:
             raise KeyboardInterrupt
         self.interrupted = True
-        if self._is_terminal:
-            self._write(f'{WIPE}stopping; Ctrl-C again discards the plan\n')
+        if self._is_terminal:  # past the stream, as the signal may have interrupted a write to it
+            with suppress(OSError):
+                os.write(self._stream.fileno(),
+                         f'{WIPE}stopping; Ctrl-C again discards the plan\n'.encode())
 
     def _write(self, text: str) -> None:
         self._stream.write(text)
