@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -20,6 +19,7 @@ import yaml
 from docs_pages import LANGUAGES, MARKS, PAGES, ROOT, blocks, prose
 
 from uav_task_alloc import scenario
+from uav_task_alloc.nodes.ros.udp_ports import free_port
 
 BLOCKS = [block for page in PAGES for block in blocks(page)]
 NO_ROS = importlib.util.find_spec('rclpy') is None
@@ -32,12 +32,6 @@ def by_name(page):
 
 def needs_ros(text):
     return 'ros2 ' in text or 'rclpy' in text
-
-
-def free_port(kind):
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
 
 
 class Sandbox:
@@ -74,8 +68,7 @@ class Sandbox:
                      'FASTRTPS_DEFAULT_PROFILES_FILE': str(quick)}
 
     def _own_port(self, match):
-        kind = socket.SOCK_STREAM if match[1] == 'port:=' else socket.SOCK_DGRAM
-        return match[1] + str(self.ports.setdefault(match[2], free_port(kind)))
+        return match[1] + str(self.ports.setdefault(match[2], free_port()))
 
     def apply(self, block):
         """Run, write or skip a block, by its mark and language."""

@@ -13,7 +13,8 @@ import pytest
 from ament_index_python.packages import get_package_prefix
 
 from uav_task_alloc.nodes import demo
-from uav_task_alloc.nodes.ros.udp_ports import free_domain
+from uav_task_alloc.nodes.ros import udp_ports
+from uav_task_alloc.nodes.ros.udp_ports import free_domain, free_port
 
 pytestmark = pytest.mark.ros
 
@@ -45,6 +46,16 @@ def test_a_domain_in_which_another_node_takes_part_is_not_chosen():
         participant.bind(('', 7410 + 250 * domain + 2))
         assert free_domain(domain) not in (domain, 0)
     assert free_domain(domain) == domain
+
+
+def test_a_port_is_none_that_linux_assigns_at_random_and_not_in_use(monkeypatch):
+    low, high = map(int, Path('/proc/sys/net/ipv4/ip_local_port_range').read_text().split())
+    first = free_port()
+    assert not low <= first <= high
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as used:
+        used.bind(('127.0.0.1', first))
+        monkeypatch.setattr(udp_ports, '_PORTS', range(first, first + 1))
+        assert free_port() == 0
 
 
 def test_finding_34_a_bad_scenario_costs_no_earlier_results(tmp_path, capsys, no_nodes):

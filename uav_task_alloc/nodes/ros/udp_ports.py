@@ -2,20 +2,22 @@
 """UDP ports and the ROS domain for a fleet that is simulated on this machine."""
 from __future__ import annotations
 
+import random
 import socket
 
 _DOMAINS = 101  # 0 to 101: above are ports that Linux assigns at random
+_PORTS = range(61_000, 65_536)  # above those of domains and those that Linux assigns at random
 
 
 def free_port() -> int:
     """Find a UDP port on 127.0.0.1 that is not in use.
 
     Returns:
-        Its number; another process may still take it.
+        Its number, drawn at random, and not one that Linux gives to another socket meanwhile;
+        a process that asks for it may still take it. 0, any port, where none is free.
     """
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        return int(probe.getsockname()[1])
+    ports = random.SystemRandom().sample(_PORTS, len(_PORTS))
+    return next((port for port in ports if _is_free('127.0.0.1', port)), 0)
 
 
 def free_domain(preferred: int) -> int:
@@ -37,10 +39,13 @@ def _has_no_participant(domain: int) -> bool:
 
     Only those of the first ten participants are tried: a new one takes the lowest free port.
     """
-    for participant in range(10):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(('', 7410 + 250 * domain + 2 * participant))
-            except OSError:
-                return False
+    return all(_is_free('', 7410 + 250 * domain + 2 * participant) for participant in range(10))
+
+
+def _is_free(address: str, port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((address, port))
+        except OSError:
+            return False
     return True
