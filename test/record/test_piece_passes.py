@@ -104,3 +104,36 @@ def test_a_strip_that_was_left_in_between_is_not_flown():
 def test_a_strip_that_was_left_is_flown_when_the_vehicle_goes_on_where_it_left_it(again, passes):
     ways = (-20, 40), (60, 40), (60, 120), (again, 100), (again, 40), (200, 40), (200, 80)
     assert len(piece_passes(run(), flown(*ways))['field#1']) == passes
+
+
+@pytest.mark.parametrize(('meets_at', 'passes'), [(50, 1), (60, 1), (72, 1), (90, 0), (150, 0)])
+def test_a_strip_that_was_left_is_flown_when_the_rest_is_flown_from_its_other_end(
+        meets_at, passes):
+    ways = ((-20, 40), (60, 40), (60, 120), (220, 120), (220, 40), (meets_at, 40),
+            (meets_at, 120), (150, 120))
+    assert len(piece_passes(run(), flown(*ways))['field#1']) == passes
+
+
+def test_a_strip_flown_in_parts_and_then_whole_is_flown_twice():
+    ways = ((-20, 40), (60, 40), (60, 120), (220, 120), (220, 40), (50, 40), (50, 120), (-20, 120),
+            (-20, 40), (220, 40))
+    assert len(piece_passes(run(), flown(*ways))['field#1']) == 2
+
+
+@pytest.mark.parametrize(('items', 'twice'), [((0.0,), 0), ((0.0, 200.0), 1)])
+def test_a_lost_vehicle_has_flown_a_strip_where_it_reached_the_end(items, twice):
+    truth = flown(*BOTH)
+    truth.tracks['lost'] = [TrueSample(20.0 * k, (x, 40.0, 50.0))
+                            for k, x in enumerate((-20.0, 199.0))]
+    truth.died['lost'] = TrueSample(20.5, (199.0, 40.0, 50.0))
+    truth.reached = [Reached(uav, (x + 20.0) / 10.95, (x, 40.0, 50.0)) for uav, ends in (
+        ('u1', (0.0, 200.0)), ('lost', items)) for x in ends]
+    assert len(piece_passes(run(), truth)['field#1']) == 1 + twice
+
+
+def test_a_short_way_that_is_crossed_on_the_way_elsewhere_is_not_flown():
+    made = run()
+    made.ways['field#1'] = [(50.0, 40.0, 50.0), (67.0, 41.0, 50.0)]
+    truth = flown((62, 10), (54, 70), (54, 100), (20, 40), (90, 43))
+    [reached] = piece_passes(made, truth)['field#1']
+    assert reached.wall > 60.0
