@@ -100,6 +100,25 @@ def test_a_px4_mission_is_replaced_at_once_with_the_current_item_flagged():
     assert bench.vehicles[1].flight.mode.name == 'MISSION'
 
 
+@pytest.mark.parametrize('third', ['BC', 'ZBC'])
+def test_a_task_of_a_list_that_is_taken_and_not_verified_is_reported_with_its_revision(
+        third):
+    bench = flying('px4', 'ABC')
+    taken = []
+
+    def unread(direction, message, _):
+        taken.extend([message] * (message.get_type() == 'MISSION_ACK' and direction == 'down'))
+        return [] if taken and message.get_type() == 'MISSION_COUNT' else None
+
+    bench.line.tampers.append(unread)
+    bench.assign(task_list('ZBC', 2))
+    assert bench.run(lambda: taken)
+    bench.assign(task_list(third, 3))
+    assert bench.run(lambda: 'Z' in bench.completed(), 60.0)
+    assert bench.onboard().revision == 1
+    assert [e.revision for _, e in bench.events if e.task == 'Z'] == [2]
+
+
 @BOTH
 def test_a_replacement_waits_for_the_end_of_a_service(kind):
     bench = flying(kind, 'AB', service=8.0)

@@ -17,7 +17,8 @@ def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
     while progress.events:
         event = progress.events.popleft()
         kind = 'COMPLETED' if event.completed else 'STARTED'
-        latest = onboard.tasks.revision if event.while_offline and onboard.tasks else revision
+        latest = onboard.tasks.revision if event.while_offline and onboard.tasks else (
+            onboard.list.revision_with(event.task, revision))
         if event.completed:
             watch.mark_task(event.task, progress.completed.get(event.task), True, now)
         events.append(TaskProgress(event.task, kind, latest))

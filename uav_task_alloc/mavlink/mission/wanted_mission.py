@@ -83,7 +83,8 @@ class WantedMission:
         self._items: tuple[object, tuple[Item, ...]] | None = None  # cached, with their key
         self._remaining: tuple[object, TaskList] | None = None  # cached, with its key
         self._state: object = None  # what of that key and list decides the items
-        self._listed: dict[str, int] = {}  # the last revision with a task that was not completed
+        # the first and the last revision with a task that was not completed
+        self._listed: dict[str, tuple[int, int]] = {}
         self._dropped: frozenset[str] = frozenset()  # completed tasks that a later list dropped
         # list and task to which detour points are left out, and how many of the first ones
         self.left_out: tuple[TaskList, str, int] | None = None
@@ -107,7 +108,8 @@ class WantedMission:
         self._progress.set_listed_tasks(listed)
         ids, completed = {task.id for task in listed}, self._progress.completed.keys()
         self._dropped = (self._dropped | (completed - ids)) & completed
-        self._listed.update(dict.fromkeys(ids - completed, tasks.revision))
+        self._listed.update((task, (self._listed.get(task, (tasks.revision, 0))[0],
+                                    tasks.revision)) for task in ids - completed)
         for task in listed:
             if self._refused.get(task.id, (task, ''))[0] != task:
                 del self._refused[task.id]
@@ -125,7 +127,19 @@ class WantedMission:
         """The revision under which it was flown if a later list dropped it; else the latest."""
         assert self.tasks is not None
         latest = self.tasks.revision
-        return self._listed.get(task, latest) if task in self._dropped else latest
+        return self._listed.get(task, (latest, latest))[1] if task in self._dropped else latest
+
+    def revision_with(self, task: str, revision: int) -> int:
+        """Return the revision of a received list with a task that is nearest to another one.
+
+        The vehicle may fly the mission of a list before that is verified on board.
+
+        Args:
+            task: id.
+            revision: of the list that was verified last; 0: none was.
+        """
+        first, last = self._listed.get(task, (revision, revision)) if revision else (0, 0)
+        return min(max(revision, first), last)
 
     def repeat(self, task: str) -> bool:
         """Fly a completed task again, whose completion the allocator has acknowledged.
@@ -138,7 +152,7 @@ class WantedMission:
             return False
         self._progress.forget(task)
         self._dropped -= {task}
-        self._listed[task] = self.tasks.revision
+        self._listed[task] = self.tasks.revision, self.tasks.revision
         return True
 
     def cruise(self) -> float:
