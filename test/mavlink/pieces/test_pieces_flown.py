@@ -312,3 +312,25 @@ def test_a_way_that_a_list_turns_during_a_long_upload_counts_as_it_is_flown(turn
     assert bench.run(lambda: len(bench.completed()) == 2, 400.0)
     bench.run(limit=10.0)
     assert [bench.flown().count(point) for point in line.path[1:-1]] == [1] * (2 + closed)
+
+
+def test_the_rest_of_a_strip_along_which_the_vehicle_was_held_unseen_is_flown_from_its_begin():
+    line, unseen = piece('L', (0, 60), (400, 60)), [False]
+    other = piece('X', (0, 260), (60, 260))
+    bench, track = surveying('ardupilot', list_of(line, other), delay=(0.1, 0.1))
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        unseen[0] and m.get_type() == 'GLOBAL_POSITION_INT') else None)
+    body = bench.vehicles[1].flight.body
+    assert bench.run(lambda: body.position[0] > 60.0)
+    bench.assign(list_of(line, piece('M', (400, 160), (0, 160)), other, revision=2))
+    assert bench.run(lambda: bench.onboard().revision == 2)
+    assert bench.run(lambda: bench.onboard().progress.coverage.latest == 'L')
+    begin = body.position[0]
+    unseen[0] = True
+    assert bench.run(lambda: body.position[0] > begin + 30.0)
+    bench.assign(list_of(line, piece('N', (400, 210), (0, 210)), other, revision=3))
+    bench.run(limit=1.5)
+    unseen[0] = False
+    assert bench.run(lambda: set(bench.completed()) == {'L', 'N', 'X'}, 300.0)
+    assert not [note for note in bench.notes if 'was not flown' in note]
+    assert track.times_flown(line)[-1] == 1

@@ -120,19 +120,19 @@ class PieceCoverage:
         return self._latest
 
     def must_begin(self, item: Item | None, place: Point) -> bool:
-        """Whether a way has to be flown from its first point: nothing of it is known to be flown.
+        """Whether what is left of a way has to be flown from its first point on.
 
         Args:
             item: that the vehicle would fly on to.
             place: of the vehicle [m] ENU.
 
         Returns:
-            True where the item is of such a way, and the vehicle is not at its first point.
+            True where the item is of such a way, nothing of that is known to be flown, and the
+            vehicle is not at its first point.
         """
         piece = self._pieces.get(item.task) if item is not None and item.along else None
         return piece is not None and piece.flown < _SHORTEST and (
-            piece.high - piece.low >= piece.at[-1] - 1e-6
-            and math.dist(place, piece.way[0]) > self.corridor + _SLACK)
+            math.dist(place, piece.way[0]) > self.corridor + _SLACK)
 
     def is_followed(self, stop: MissionStop) -> bool:
         """Whether the vehicle is flying along the way of a stop, in the direction of the stop."""
