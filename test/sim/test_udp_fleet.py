@@ -3,6 +3,7 @@
 import json
 import socket
 import time
+from itertools import pairwise
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -116,6 +117,22 @@ def test_the_log_has_samples_and_events(fleet, station, tmp_path):
     assert sample['battery'] == 1.0
     died = next(r for r in lines(path) if r.get('event') == 'died')
     assert (died['uav'], died['x']) == ('uav_2', 20.0)
+
+
+def test_vehicles_fly_and_send_on_while_the_process_stalls(fleet, station, tmp_path):
+    def known(received):
+        return [m.time_boot_ms for m in received
+                if m.get_type() == 'ATTITUDE' and m.get_srcSystem() == 1]
+
+    station.until(lambda received: len(known(received)) > 5)  # of the PX4, at 100 Hz
+    with fleet._lock:
+        begun = fleet.now()
+        time.sleep(0.6)
+    station.until(lambda received: known(received)[-1] > 1e3 * (begun + 8.0))
+    for times in ([row['t'] for row in lines(tmp_path / 'log.jsonl')
+                   if row['uav'] == 'uav_1' and 'event' not in row],
+                  [1e-3 * t for t in known(station.received)]):
+        assert max(b - a for a, b in pairwise(times)) < 1.0
 
 
 @pytest.mark.parametrize(('text', 'address'), [

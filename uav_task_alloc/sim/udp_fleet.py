@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import select
 import socket
 import threading
@@ -22,6 +23,7 @@ from uav_task_alloc.sim.vehicle import AUTOPILOTS, Vehicle
 UdpAddress = tuple[str, int]
 _TICK = 0.02  # [s] wall time between steps
 _SAMPLE = 0.5  # [s] vehicle time between ground-truth samples
+_LONGEST = 0.25  # [s] vehicle time of one step, where a tick is not longer
 _MAX_REMOTES = 16  # that a vehicle sends to besides its target; the latest are kept
 
 
@@ -66,7 +68,7 @@ class UdpFleet:
                            for config, autopilot in vehicles}
         self._log = _Log(log_file, self._epoch) if log_file else None
         self.judge = SeparationJudge(*separation)
-        self._sample_at = 0.0
+        self._sample_at = self._stepped = 0.0
 
     @property
     def vehicles(self) -> dict[str, Vehicle]:
@@ -101,7 +103,7 @@ class UdpFleet:
             if not alive:
                 endpoint.vehicle.kill()
             elif not endpoint.vehicle.alive:
-                endpoint.vehicle.revive(self.now())
+                endpoint.vehicle.revive(self._stepped)
         return ''
 
     def spin(self) -> None:
@@ -111,11 +113,18 @@ class UdpFleet:
         while not self._stopping.is_set():
             ready, _, _ = select.select(list(sockets), [], [], max(0.0, due - time.monotonic()))
             with self._lock:
-                for one in ready:
-                    sockets[one].receive(self.now())
                 if time.monotonic() >= due:
                     due = time.monotonic() + _TICK
-                    self._step(self.now())
+                    self._step_to(self.now())
+                for one in ready:
+                    sockets[one].receive(self._stepped)
+
+    def _step_to(self, now: float) -> None:
+        """Step to `now` as if the process had not stalled: real vehicles fly and send on."""
+        steps = max(1, math.ceil((now - self._stepped) / max(_LONGEST, _TICK * self.speedup)))
+        for left in reversed(range(steps)):
+            self._step(now - left * (now - self._stepped) / steps)
+        self._stepped = now
 
     def _step(self, now: float) -> None:
         for endpoint in self._endpoints.values():
