@@ -53,6 +53,11 @@ def test_a_corner_is_neither_cut_nor_overshot_by_more_than_its_radius(bench):
     assert min(metres_between(p, A) for p in path) < 2.0
 
 
+def test_a_corner_in_two_points_near_each_other_is_not_overshot_either(bench):
+    bench.fly(waypoint(A), waypoint((101.0, 0.0, 30.0)), waypoint((0.0, 50.0, 30.0)))
+    assert max(p[0] for p, _ in trace(bench, 40.0)) < 105.0
+
+
 def test_a_fast_vehicle_does_not_fly_past_its_waypoint():
     bench = Bench('ardupilot', cruise_speed=30.0)
     bench.fly(waypoint((400.0, 0.0, 30.0)), waypoint((800.0, 0.0, 30.0)))

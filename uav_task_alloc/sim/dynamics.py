@@ -163,7 +163,10 @@ class Track:
         return self.points[-1] if self.points else None
 
     def exit_speed(self, position: Point, then: Point | None, acceleration: float) -> float:
-        """Speed [m/s] at which the target may be passed for a turn within _CORNER.
+        """Speed [m/s] at which the target may be passed.
+
+        It lets the vehicle turn within _CORNER, and stop at the next point, after which it knows
+        of no other (PX4: `PositionSmoothing`, ArduPilot: `SCurve`).
 
         Args:
             position: ENU [m].
@@ -181,7 +184,8 @@ class Track:
         lengths = _norm(inward) * _norm(outward)
         cosine = _dot(inward, outward) / max(lengths, 1e-9)
         sine = 1.0 if cosine <= 0.0 else math.sqrt(max(0.0, 1.0 - cosine**2))
-        return math.sqrt(2.0 * acceleration * _CORNER) / max(sine, 1e-3)
+        return min(math.sqrt(2.0 * acceleration * _CORNER) / max(sine, 1e-3),
+                   math.sqrt(2.0 * _BRAKING * acceleration * _norm(outward)))
 
     def finished(self, position: Point, now: float) -> bool:
         """Mark the points passed at `now` [s]; True once the last point was held long enough.
