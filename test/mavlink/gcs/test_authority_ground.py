@@ -243,3 +243,23 @@ def test_a_return_set_after_a_reboot_on_the_ground_that_is_not_seen_yet_is_of_an
     hidden.clear()
     assert bench.reaches(L, 8.0)
     assert sends_no_command(bench)
+
+
+@BOTH
+@pytest.mark.parametrize('boots', [True, False])
+@pytest.mark.parametrize('after', [1.5, 3.4])
+def test_a_stick_mode_set_on_the_ground_before_a_reboot_is_of_a_pilot(kind, boots, after):
+    config = {'boot_delay': 6.0, 'arming_delay': 8.0} if boots else {}
+    bench, hidden = on_ground(kind, H, configs={1: config}), []
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        hidden and direction == 'down' and m.get_type() == 'HEARTBEAT') else None)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.reaches(S)
+    bench.run(limit=after)
+    bench.vehicles[1].reboot(bench.now)
+    hidden += [] if boots else [True]  # its clock is received before a heartbeat
+    bench.run(limit=1.2)
+    hidden.clear()
+    bench.run(limit=14.0)
+    assert status_is(bench, L)
+    assert sends_no_command(bench)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pymavlink.dialects.v20 import ardupilotmega as d
+
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityState, Suspension
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic
@@ -12,6 +14,7 @@ from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED
 
 _CLIMBED = 0.9  # of the commanded height: the take-off ended normally
 _HEARTBEAT_DELAY = 1.5  # [s] on the way, as a rule
+_CLOCK_DELAY = 0.5  # [s] of a message with the clock, as a rule
 _CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
 
 
@@ -104,7 +107,7 @@ class ModeChanges:
         elif not (state.flown or state.armed or state.is_return(mode)) and state.authority.held:
             # never armed: a reboot looks the same until a message with its clock is received,
             # but no vehicle boots into its return
-            state.suspend_until_explained(self._rebooted_since(), why, now)
+            state.suspend_until_explained(self._rebooted_by(now), why, now)
         elif state.authority.state is not AuthorityState.NONE or state.telemetry.past_boot:
             state.apply_taken(why, now)
 
@@ -196,9 +199,16 @@ class ModeChanges:
         return self._family == 'px4' and self._evidence.may_end() and (
             self._state.class_of(mode) is ModeClass.HOLD or self._state.is_return(mode))
 
-    def _rebooted_since(self) -> Callable[[float], bool]:
-        """A predicate: it rebooted after the last heartbeat with the mode before, not earlier."""
+    def _rebooted_by(self, now: float) -> Callable[[float], bool]:
+        """A predicate: it rebooted between the last heartbeat with the mode before and this one.
+
+        A reboot after this heartbeat does not explain its mode, which another has set before.
+
+        Args:
+            now: when the heartbeat with the new mode was received [s].
+        """
         state, telemetry, before = self._state, self._state.telemetry, self._state.heartbeat_at
-        restarts = telemetry.restarts
-        return lambda now: state.booting or (
-            telemetry.restarts != restarts and telemetry.booted_at > before - _HEARTBEAT_DELAY)
+        restarts, booted = telemetry.restarts, state.status >= d.MAV_STATE_STANDBY
+        earliest, latest = before - _HEARTBEAT_DELAY, now + _CLOCK_DELAY
+        return lambda t: (state.booting and not booted) or (
+            telemetry.restarts != restarts and earliest < telemetry.booted_at <= latest)
