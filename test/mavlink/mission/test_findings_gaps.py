@@ -40,3 +40,19 @@ def test_a_mission_that_begins_again_after_its_end_is_known_by_the_second_report
         flight.stay(1.0)
         flight.table.note_current(0, flight.now, True, flight.frame())
     assert flight.table.current == current
+
+
+@pytest.mark.parametrize(('flew', 'completed'), [(True, ['A']), (False, [])])
+def test_a_report_sent_before_the_mission_was_left_shows_that_it_was_flown_until_then(
+        flew, completed):
+    flight = Flight(repeats=False)
+    flight.begin(A=101.0, B=200.0)
+    flight.fly_to(96.0)
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(98.0)
+    report = flight.frame()
+    flight.table.note_other_mode(flight.now)  # its ACK has overtaken the report
+    flight.fly_to(100.0)
+    flight.table.note_current(1, flight.now, False, report, flew=flew)
+    flight.stay(8.0)
+    assert list(flight.table.completed) == completed

@@ -241,7 +241,8 @@ class MissionExecutor:
             self.onboard.resume.note_current(seq, now, self.telemetry.frame)
             if self.onboard.set_current_to is None:  # else seq is of the previous mission
                 progress.note_current(seq, now, flying, self.telemetry.frame,
-                                      self.telemetry.mission_restarted)
+                                      self.telemetry.mission_restarted,
+                                      self.telemetry.showed_mission)
             elif flying:
                 self.onboard.note_flown_unset(seq, now)
             ended = self.telemetry.mission_ended and self.onboard.set_current_to is None

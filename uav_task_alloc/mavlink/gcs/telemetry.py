@@ -152,6 +152,11 @@ class Telemetry:
         return self._in_mission_frame == self.frame > self._mode_frame
 
     @property
+    def showed_mission(self) -> bool:
+        """Whether the latest message is a MISSION_CURRENT sent before mission mode was left."""
+        return self._in_mission_frame == self.frame <= self._mode_frame
+
+    @property
     def past_boot(self) -> bool:
         """Whether the autopilot has booted, so that its mission store is available."""
         return self.autopilot not in ESTIMATE or self._started

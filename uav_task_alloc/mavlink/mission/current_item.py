@@ -52,6 +52,7 @@ class CurrentItem:
         self._in_mission_at = -math.inf  # vehicle time [s] at which it was in mission mode last
         self._shown_until = -math.inf  # vehicle time [s] until which a frame has shown that
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
+        self._flew_until: int | None = None  # number of the latest frame sent before, with an item
         # vehicle times [s] between which it left mission mode while no position came
         self._left_unseen = math.inf, -math.inf
         # item and when [s] a report of another mode set it back, as that of a restart does
@@ -163,7 +164,7 @@ class CurrentItem:
         self._epoch.started = self.set_by_other = None
 
     def note_report(self, seq: int, now: float, flying: bool, frame: int | None = None,
-                    restarted: bool = False) -> None:
+                    restarted: bool = False, flew: bool = False) -> None:
         """Take a MISSION_CURRENT; items before it are claimed to be flown.
 
         Args:
@@ -172,7 +173,10 @@ class CurrentItem:
             flying: whether the vehicle is in mission mode in the air.
             frame: number of its frame; None: not known.
             restarted: whether the mission was complete, and has begun again without a command.
+            flew: whether it was sent in mission mode, which the vehicle has left since.
         """
+        if flew and frame is not None:
+            self._flew_until = frame
         reports, epoch = self.reports, self._epoch
         reports.previous_frame = reports.last_frame
         if not reports.is_old(seq, now, frame):
@@ -308,7 +312,9 @@ class CurrentItem:
         route = tuple(item for item in epoch.items[begin:] if item.position is not None)
         until = positions.vehicle_time(now)
         if not self.in_mission:  # positions after it left mission mode prove nothing
-            until = min(until, max(epoch.since, self._left_at))
+            left_at = self._left_at if frame is None or frame != self._flew_until else (
+                max(self._left_at, positions.sent_between(frame)[1]))
+            until = min(until, max(epoch.since, left_at))
         self.passed.add(Claim(
             items, route, epoch.since, until, now + MAX_MESSAGE_DELAY, epoch.number,
             self._frames_of_reached(begin, end, now, frame), frame, skips, in_flight,

@@ -324,9 +324,9 @@ class ProgressTable:
         self._reached.note_end(seq, now)
 
     def note_current(self, seq: int, now: float, flying: bool, frame: int | None = None,
-                     restarted: bool = False) -> None:
+                     restarted: bool = False, flew: bool = False) -> None:
         """Take a MISSION_CURRENT; see `CurrentItem.note_report`."""
-        self._moves.note_report(seq, now, flying, frame, restarted)
+        self._moves.note_report(seq, now, flying, frame, restarted, flew)
 
     def may_have_ended_unseen(self, seq: int) -> bool:
         """Whether it left mission mode while no position came, with item `seq` as the last."""
