@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A task that was passed, and still to be judged, when its bridge or its mission was replaced."""
 import pytest
-from authority_bench import ARDUPILOT, MODES, flying
+from authority_bench import ARDUPILOT, MODES, L, flying
 from evidence_bench import Flight
-from findings_bench import drop_messages, flown_once_each
+from findings_bench import distance, drop_messages, flown_once_each
 from flight_bench import places
 from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+AT_A = (0.0, 100.0, 50.0)
 
 
 def passed_a(kind, names):
@@ -59,3 +62,29 @@ def test_a_reached_of_the_last_item_of_a_mission_found_on_board_needs_no_later_c
     flight.reached(1)
     flight.stay(1.0)
     assert ('B' in flight.table.completed) is known
+
+
+@ARDUPILOT
+@pytest.mark.parametrize('skipped', [False, True])
+def test_a_task_flown_for_a_pilot_before_a_restarted_bridge_has_read_the_mission_is_known(
+        kind, skipped):
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: distance(bench, AT_A) < 15.0 + 10.0 * skipped, 60.0)
+    bench.vehicles[1].rc_mode(MODES[kind].own)
+    bench.run(limit=6.0)
+    assert places(bench) == []
+    assert bench.authority() is L
+    bench.kill_and_restart(0.0)
+    for message in ('MISSION_ITEM_REACHED', 'MISSION_COUNT'):
+        drop_messages(bench, 'down', message, lambda m: True)
+    bench.assign(task_list('ABC', 2))
+    bench.vehicles[1].rc_mode(MODES[kind].mission)
+    if skipped:
+        bench.run(limit=0.6)
+        bench.from_station(d.MAVLink_mission_set_current_message(1, 1, 2))
+    assert skipped or bench.run(lambda: places(bench) == ['A'], 20.0)
+    bench.run(limit=1.6)
+    bench.line.tampers.clear()
+    bench.run(limit=1.5)
+    assert bench.completed() == ([] if skipped else ['A'])
+    flown_once_each(bench, 'ABC')

@@ -69,11 +69,10 @@ class Resume:
         self.passed: tuple[int, ...] = ()  # see `AuthorityRecord`
         self._seen: tuple[PositionSample, ...] = ()  # the last positions of the previous run
         self.recorded_upload: tuple[int, ...] = ()  # checksum and first item of an upload then
-        self.was_disarmed = True  # in the last record; or there is none
-        self.was_in_mission = False  # in the last record
+        self.was_disarmed, self.was_in_mission = True, False  # in the last record
         self.cruise: Callable[[], float] = lambda: math.nan  # [m/s]; NaN: not known
         self._missions: tuple[tuple[Item, ...], ...] = ()  # read so far
-        self.current_unreliable = False  # items before the current one may be unflown
+        self.current_unreliable = self.was_replacing = False  # items before it may be unflown
         self._rebooted = self._passed_recorded = False
         self._unread = UnreadReports(telemetry, progress.positions, profile.atomic)
         self.reset()
@@ -219,8 +218,9 @@ class Resume:
     def _begin_nowhere(self, held: tuple[Item, ...], now: float) -> None:
         """Begin a mission whose current item may be that of the mission before it."""
         self._credit_unread(held, now)
-        if not self.current_unreliable:
-            passed = self._unread.passed(self._placed(held), self._home_of(held))
+        if not self.was_replacing:
+            passed = self._unread.passed(
+                self._placed(held), self._home_of(held), self.current_unreliable)
             self._credit(tuple(held[n] for n in sorted(passed)), now)
         if self._telemetry.airborne and self.recorded[0] is None:  # no file: taken at the start
             flown = held[:self._unread.flown_first(len(held))]

@@ -159,18 +159,20 @@ class UnreadReports:
         self._reached.clear()
         return reached
 
-    def passed(self, held: tuple[Item, ...], home: Point | None) -> set[int]:
+    def passed(self, held: tuple[Item, ...], home: Point | None,
+               while_current: bool = False) -> set[int]:
         """Return the items that it was seen to pass in mission mode.
 
         Args:
             held: the items on board, with their positions, without home.
             home: [m] ENU, where it returns to after the last item; None: it does not, or not
                 known.
+            while_current: only what it was at since a report of it as the item that it flies.
 
         Returns:
             Indices of those that the positions show to be flown.
         """
-        return _passed(self.currents, self._positions, held, home)
+        return _passed(self.currents, self._positions, held, home, while_current)
 
     def flown_first(self, count: int) -> int:
         """Return the item that a mission of so many items was flying when this run began.
@@ -246,10 +248,12 @@ class UnreadReports:
 
 
 def _passed(currents: list[UnreadCurrent], positions: PositionHistory, held: tuple[Item, ...],
-            home: Point | None) -> set[int]:
+            home: Point | None, while_current: bool = False) -> set[int]:
     flying, passed = [each for each in currents if each.flying], set[int]()
     for before, then in pairwise(flying):  # it falls at a restart that is not noticed yet
         if before.seq < then.seq <= len(held):
+            since = -math.inf if not while_current else positions.vehicle_time(
+                next(each.at for each in flying if each.seq == before.seq))
             passed |= flown_between(
-                held, before.seq, then.seq, then.at, then.frame, positions, home)
+                held, before.seq, then.seq, then.at, then.frame, positions, home, since=since)
     return passed

@@ -208,7 +208,7 @@ def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:
 
 def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, frame: int,
                   positions: PositionHistory, home: Point | None = None,
-                  left_unseen: bool = False) -> set[int]:
+                  left_unseen: bool = False, since: float = -math.inf) -> set[int]:
     """Judge the items that were passed while no bridge ran; no evidence of them will come.
 
     Args:
@@ -220,11 +220,12 @@ def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, fra
         positions: of the vehicle.
         home: [m] ENU, where it returns to after the last item; None: it does not, or not known.
         left_unseen: whether it has left mission mode in a gap of the positions.
+        since: vehicle time [s]; what it was at before does not count.
 
     Returns:
         Indices of those that were flown.
     """
-    claim = replace(_numbered_claim(items, begin, end, home),
+    claim = replace(_numbered_claim(items, begin, end, home), since=since,
                     until=positions.vehicle_time(now), frame=frame)
     judged = PassedItems(FrameLog(), positions).judge(claim, claim.items, now, left_unseen)
     return {int(item.task) for item in judged.flown}
