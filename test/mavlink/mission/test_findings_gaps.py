@@ -3,6 +3,8 @@
 import pytest
 from evidence_bench import SPEED, Flight
 
+from uav_task_alloc.mavlink.mission.flown_path import PositionSample
+
 
 @pytest.mark.parametrize(('left_at', 'known'), [(97.0, False), (99.0, True)])
 def test_a_gap_after_the_mission_was_left_is_no_evidence(left_at, known):
@@ -56,3 +58,50 @@ def test_a_report_sent_before_the_mission_was_left_shows_that_it_was_flown_until
     flight.table.note_current(1, flight.now, False, report, flew=flew)
     flight.stay(8.0)
     assert list(flight.table.completed) == completed
+
+
+@pytest.mark.parametrize('repeats', [True, False])
+@pytest.mark.parametrize(('x', 'seq', 'completed'), [
+    (94.0, 0, ['A']), (94.0, 1, []), (60.0, 0, [])])
+def test_a_reached_that_a_reboot_overtakes_counts_where_the_vehicle_came_there(
+        repeats, x, seq, completed):
+    flight = Flight(repeats=repeats)
+    flight.begin(A=100.0, B=200.0)
+    flight.table.note_in_mission(flight.frame())
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(x)
+    flight.table.invalidate()
+    flight.now += 0.2
+    flight.reached(seq)
+    assert list(flight.table.completed) == completed
+
+
+def test_a_place_passed_in_another_mode_is_no_evidence_for_what_a_station_skips_later():
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0)
+    flight.table.note_in_mission(flight.frame())
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(60.0)
+    flight.table.note_other_mode(flight.now)
+    flight.fly_to(110.0)
+    flight.fly_to(60.0)
+    flight.table.note_current(0, flight.now, False, flight.frame())
+    flight.table.note_in_mission(flight.frame())
+    flight.stay(0.4, SPEED)
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    flight.stay(8.0)
+    assert not flight.table.completed
+
+
+def test_a_position_of_a_restart_that_is_not_noticed_yet_hides_no_task_passed_before():
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0)
+    flight.table.note_in_mission(flight.frame())
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(102.0)
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    flight.now += 0.2
+    flight.table.add_position(PositionSample(0.1, (102.0, 0.0, 0.0), (0.0, 0.0, 0.0)), True,
+                              flight.now, flight.frames.note(round(20 * flight.now), flight.now))
+    flight.table.invalidate()
+    assert list(flight.table.completed) == ['A']

@@ -53,6 +53,8 @@ class CurrentItem:
         self._shown_until = -math.inf  # vehicle time [s] until which a frame has shown that
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
         self._flew_until: int | None = None  # number of the latest frame sent before, with an item
+        # vehicle time [s] at which the current item was reported in another mode last
+        self._unflown_until = -math.inf
         # vehicle times [s] between which it left mission mode while no position came
         self._left_unseen = math.inf, -math.inf
         # item and when [s] a report of another mode set it back, as that of a restart does
@@ -82,7 +84,8 @@ class CurrentItem:
         self.reports.clear()
         self.passed.clear()
         self.set_by_other = None
-        self._left_unseen, self._shown_until = (math.inf, -math.inf), -math.inf
+        self._left_unseen = math.inf, -math.inf
+        self._shown_until = self._unflown_until = -math.inf
 
     def _active_at_end(self, now: float) -> Item | None:
         """The item that was flown until the last position before a restart; None: not known.
@@ -179,6 +182,8 @@ class CurrentItem:
             self._flew_until = frame
         reports, epoch = self.reports, self._epoch
         reports.previous_frame = reports.last_frame
+        if not flying and seq == epoch.current and frame is not None:
+            self._unflown_until = self._positions.sent_between(frame)[0]
         if not reports.is_old(seq, now, frame):
             self._move(seq, now, flying, frame)
         reports.note(seq, frame)
@@ -315,8 +320,9 @@ class CurrentItem:
             left_at = self._left_at if frame is None or frame != self._flew_until else (
                 max(self._left_at, positions.sent_between(frame)[1]))
             until = min(until, max(epoch.since, left_at))
+        since = max(epoch.since, self._unflown_until) if in_flight else epoch.since
         self.passed.add(Claim(
-            items, route, epoch.since, until, now + MAX_MESSAGE_DELAY, epoch.number,
+            items, route, since, until, now + MAX_MESSAGE_DELAY, epoch.number,
             self._frames_of_reached(begin, end, now, frame), frame, skips, in_flight,
             first=epoch.items[begin], others_since=self._reported_until(begin)))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The end of a mission that PX4 has reported: without its REACHED, or just before a restart."""
+"""What is reported just before a restart and comes after it; the end of a mission of PX4."""
 from __future__ import annotations
 
 import math
@@ -17,7 +17,7 @@ from uav_task_alloc.mavlink.transport.codec import Message
 
 
 class EndBeforeRestart:
-    """Keeps the last item where the vehicle was at it when it was restarted.
+    """Keeps the current item where the vehicle was at it, or almost, when it was restarted.
 
     Args:
         epoch: the mission on board.
@@ -29,7 +29,9 @@ class EndBeforeRestart:
     def __init__(self, epoch: Epoch, tasks: CompletedTasks, positions: PositionHistory,
                  moves: CurrentItem) -> None:
         self._epoch, self._tasks, self._positions, self._moves = epoch, tasks, positions, moves
-        self._ending: tuple[int, Item, float] | None = None  # index, item, until when [s]
+        # index, item, until when [s]; the item that was flown when the vehicle was restarted
+        self._ending: tuple[int, Item, float] | None = None
+        self._at_end = False  # it was the last one, and the vehicle at it
         self._ended: tuple[int, int, float] | None = None  # epoch, index, reported at [s]
         self._named = False  # its REACHED may repeat one of before
 
@@ -44,16 +46,24 @@ class EndBeforeRestart:
         current = epoch.current if back is None or now - back[1] > MAX_MESSAGE_DELAY else back[0]
         item = (
             None if current is None or current >= len(epoch.items) else epoch.items[current])
-        at_end = item is not None and self._flies and current == epoch.last_flown and (
-            self._positions.distance(item) <= item.radius + CLOSE)
-        self._ending = None if item is None or current is None or not at_end else (
-            current, item, now + MAX_MESSAGE_DELAY)
-        self._named = series.named_lately(epoch.last_flown, epoch.last_flown + 1, now)
-        if self._ending is not None and self._ended is not None and item is not None and (
-                self._ended[:2] == (epoch.number, current)
-                and now - self._ended[2] < MAX_MESSAGE_DELAY):
-            self._tasks.credit(item)
+        self._ending, self._at_end = None, False
+        if item is not None and current is not None and self._flies and self._may_reach(item):
+            self._ending = current, item, now + MAX_MESSAGE_DELAY
+            self._named = series.named_lately(current, current + 1, now)
+            self._at_end = current == epoch.last_flown and self._is_at(item)
+            if self._at_end and self._ended is not None and (
+                    self._ended[:2] == (epoch.number, current)
+                    and now - self._ended[2] < MAX_MESSAGE_DELAY):
+                self._tasks.credit(item)
         self._ended = None
+
+    def _is_at(self, item: Item) -> bool:
+        return self._positions.distance(item) <= item.radius + CLOSE
+
+    def _may_reach(self, item: Item) -> bool:
+        """Whether it is at an item, or comes there within a second if it keeps its velocity."""
+        return self._is_at(item) or (item.position is not None and self._positions.path.approached(
+            item.position, item.radius, -math.inf, math.inf))
 
     @property
     def _flies(self) -> bool:
@@ -89,7 +99,7 @@ class EndBeforeRestart:
         if self._ending is None:
             return
         seq, item, deadline = self._ending
-        if message.seq == seq and now < deadline:
+        if self._at_end and message.seq == seq and now < deadline:
             self._tasks.credit(item)
         self._ending = None
 

@@ -248,8 +248,10 @@ class PositionHistory:
         """
         after = min(((f, t) for f, t in self._stamps if f > frame), default=None)
         before = max(((f, t) for f, t in self._stamps if f < frame), default=None)
-        if after is None or before is None:
-            return otherwise if after is None else after[1]
+        if after is None or (before is not None and after[1] < before[1]):  # of a restart
+            return otherwise
+        if before is None:
+            return after[1]
         gap = after[1] - before[1]
         if earliest and gap <= GAP:
             return before[1]
