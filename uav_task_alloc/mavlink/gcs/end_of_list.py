@@ -2,16 +2,20 @@
 """Hold, wait or return: with an empty list; and when an upload of a mission takes too long."""
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 
-from uav_task_alloc.mavlink.autopilots import ModeFunction
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
 from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import TaskList, all_alike
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 _MAX_HOLD = 30.0  # [s] of a hold for an upload
@@ -28,11 +32,15 @@ class EndOfList:
         watch: AuthorityWatch,
         policy: Callable[[], Policy],
         notes: deque[OperatorNote],
+        profile: Profile,
     ) -> None:
         self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
-        self._watch, self._policy, self._notes = watch, policy, notes
+        self._watch, self._policy, self._notes, self._profile = watch, policy, notes, profile
         self.going_home = False  # by a list without tasks
         self.alarm = ''  # condition that requires action by a human; '': none
+        # the last item was set as current: its seq on the wire, since when [s], acknowledged
+        self._end_set: tuple[int, float, bool] | None = None
+        self._stays = False  # it was, since the mission was reported as complete
 
     def end_hold(self) -> None:
         """The vehicle flies its list: the hold for an upload is over."""
@@ -98,7 +106,36 @@ class EndOfList:
         if flying or (returns and telemetry.mode in (ModeFunction.HOLD, ModeFunction.MISSION)):
             mode = ModeFunction.RETURN if returns else ModeFunction.HOLD
             return self._sender.set_mode(mode, now)
-        return []
+        return self._stay_at_end(now)
+
+    def _stay_at_end(self, now: float) -> NextMessages:
+        """Set the last item of a complete mission of ArduPilot as current.
+
+        Else it begins again at its first item whenever its autopilot enters mission mode, as at
+        the end of an avoidance, when nothing may be sent. It is complete until then.
+        """
+        telemetry, progress = self._telemetry, self._onboard.progress
+        tasks, seq = self._onboard.tasks, len(progress.items) - 1 + self._onboard.own
+        complete = telemetry.mission_state == d.MISSION_STATE_COMPLETE
+        self._stays = self._stays and complete
+        if self._stays or not complete or self._profile.atomic or (
+                telemetry.mode is not ModeFunction.MISSION or telemetry.current != seq
+                or not progress.finished or progress.returns or tasks is None or tasks.stops):
+            return []
+
+        def done(t: float) -> None:
+            self._end_set = seq, now, True
+
+        self._end_set, self._stays = (seq, now, False), True
+        return self._sender.set_current(seq, now, done)
+
+    def may_set_end(self, now: float) -> bool:
+        """Whether a command to set the last item as current may still be on the way."""
+        if self._end_set is None:
+            return False
+        seq, since, acknowledged = self._end_set
+        sent_at = self._sender.current_set_at.get(seq, -math.inf)
+        return now - sent_at < MAX_MESSAGE_DELAY and not (acknowledged and sent_at == since)
 
     def _blocked_home(self) -> str:
         """Why it must not fly straight home; '': it may."""

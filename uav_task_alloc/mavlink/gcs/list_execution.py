@@ -54,6 +54,8 @@ class ListExecution:
             return sender.wait_for('the mission of the UAV that flew its tasks before')
         if onboard.list.awaits_speed:
             return sender.wait_for('its cruise speed (WPNAV_SPEED)')
+        if self._end_of_list.may_set_end(now):  # it would take effect in the new mission
+            return sender.wait_for('the end of a set-current that may be on the way')
         if self._chosen_by_another():
             return sender.wait_for('the item that another station has chosen')
         if diff.kind is DiffKind.JUMP:

@@ -98,7 +98,7 @@ class MissionExecutor:
         takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
                           lambda: self.policy, self.fence.missing)
         self._end_of_list = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
-                                      lambda: self.policy, self.notes)
+                                      lambda: self.policy, self.notes, profile)
         execution = ListExecution(self.sender, self.telemetry, self.onboard, self.watch, profile,
                                   self._end_of_list, self._status_text_log)
         self.holds = HoldRule(self.sender, self.telemetry, self.watch, profile, self.onboard,

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A complete mission of ArduPilot, which begins again where mission mode is entered."""
+import pytest
+from authority_bench import ARDUPILOT, MODES, flying
+from findings_bench import commanded, flown_once_each
+from flight_bench import places
+from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+
+def completed(kind, *tampers):
+    """A vehicle that has flown A and B, and whose list is empty."""
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 100.0)
+    bench.line.tampers += tampers
+    bench.assign(task_list('', 2))
+    return bench
+
+
+@ARDUPILOT
+@pytest.mark.parametrize('link', [True, False])
+def test_a_complete_mission_does_not_begin_again_when_an_avoidance_ends(kind, link):
+    bench = completed(kind)
+    bench.run(limit=3.0)
+    vehicle = bench.vehicles[1]
+    for _ in range(1 + link):
+        vehicle.avoid(True)
+        bench.run(limit=4.0)
+        bench.line.cut = not link
+        vehicle.avoid(False)
+        assert vehicle.flight.custom_mode == MODES[kind].mission
+        bench.run(limit=40.0)
+        bench.line.cut = False
+        bench.run(limit=5.0)
+    assert places(bench)[:2] == ['A', 'B']
+    assert set(places(bench)[2:]) <= {'B'}
+    assert link or bench.hand_over() == ''
+    bench.assign(task_list('CD', 3))
+    assert bench.run(lambda: bench.completed()[2:] == ['C', 'D'], 120.0)
+
+
+@ARDUPILOT
+def test_the_last_item_is_set_once_while_the_vehicle_still_reports_the_end(kind):
+    bench = flying(kind, 'AB')
+
+    def complete(direction, m, now):
+        if m.get_type() == 'MISSION_CURRENT' and m.mission_state == d.MISSION_STATE_PAUSED:
+            m.mission_state = d.MISSION_STATE_COMPLETE
+    bench.line.tampers.append(complete)
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 100.0)
+    before = commanded(bench)
+    bench.assign(task_list('', 2))
+    bench.run(limit=60.0)
+    assert commanded(bench)[len(before):] == ['set current']
+
+
+@ARDUPILOT
+@pytest.mark.parametrize('delay', [0.0, 2.5, 4.5])
+def test_a_list_waits_for_the_end_of_a_set_current_that_a_link_delays(kind, delay):
+    def late(direction, m, now):
+        is_end = m.get_type() == 'COMMAND_LONG' and (
+            m.command == d.MAV_CMD_DO_SET_MISSION_CURRENT and m.param1 == 2)
+        return [(delay, m)] if is_end else None
+    bench = completed(kind, late)
+    bench.run(limit=1.5)
+    bench.assign(task_list('CDEF', 3))
+    flown_once_each(bench, 'ABCDEF')
+    assert places(bench) == list('ABCDEF')
