@@ -44,7 +44,14 @@ def shows_armed(message: Message) -> bool:
 
 
 class Judge:
-    """Follows one flight tick by tick."""
+    """Follows one flight tick by tick.
+
+    A vehicle that was killed, and of which a heartbeat showed that, stays with its pilot until the
+    hand-over service on the ground, by the table of authority: the bridge may send nothing. What
+    others let it fly again until then, such as a complete mission that begins again where a pilot
+    sets mission mode, is no fault of the bridge: `flown_again_killed` counts it apart. A mode
+    that is set meanwhile hands nothing back, so that a command of the bridge is `overridden`.
+    """
 
     def __init__(self, world: World, kind: str, places: dict[str, tuple[float, float, float]],
                  ) -> None:
@@ -68,6 +75,7 @@ class Judge:
         self._armed_at, self._shown_armed = -math.inf, False  # [s]; by a delivered frame since
         self._taken_by_disarm = self._news = False  # a heartbeat since it was taken was delivered
         self._taken_by_mode = -math.inf  # [s]
+        self._killed = False  # known to the bridge, and not handed back by the service since
         self._events = 0
         self._forgot = False  # the bridge, until its first heartbeat
         self._set_at = -math.inf  # [s] another station has set the current item
@@ -78,10 +86,12 @@ class Judge:
         self._stuck_since = self._moved_at = 0.0
         self._listed = world.tasks  # a new list begins a new transfer
 
-    def handed_back(self) -> None:
+    def handed_back(self, by_service: bool = False) -> None:
         """Note a hand-over by the service or by a pilot."""
+        if self._killed and not by_service:
+            return
         self.taken_at = self.known_at = None
-        self.stubborn = False
+        self.stubborn = self._killed = False
         self.counts['handed_back'] += 1
 
     def rebooted(self) -> None:
@@ -95,7 +105,7 @@ class Judge:
 
         On the ground it forgets who took it, and what its predecessor had still to judge.
         """
-        self._forgot = True
+        self._forgot, self._killed = True, False
         self._evidence.forget(self.family == 'px4')
 
     def step(self) -> None:
@@ -109,8 +119,9 @@ class Judge:
         for sent, message in self.world.delivered:
             self._evidence.delivered(sent, message)
             self._shown_armed |= sent >= self._armed_at and shows_armed(message)
-            self._boot_over |= message.get_type() == 'HEARTBEAT' and (
-                message.system_status >= d.MAV_STATE_STANDBY)
+            if message.get_type() == 'HEARTBEAT':
+                self._boot_over |= message.system_status >= d.MAV_STATE_STANDBY
+                self._killed |= message.system_status > d.MAV_STATE_CRITICAL
         if self.world.now - self._set_at < PASSED:
             self._crossed.update(name for name, place in self.places.items() if math.dist(
                 place, self.world.vehicle.flight.body.position) < NEAR)
@@ -178,7 +189,10 @@ class Judge:
         if name and not again:
             self._at = name
             self.reached[name] += 1
-            if self.reached[name] == 2 and name in self._evidence.known:
+            if self.reached[name] == 2 and self._killed:
+                self.counts['flown_again_killed'] += 1
+                self.notes.append(f'{event.t:.1f} {name} reached again: killed, not handed back')
+            elif self.reached[name] == 2 and name in self._evidence.known:
                 self._fault('flown_twice', f'{name} reached again')
             elif self.reached[name] == 2:
                 self.counts['flown_again_unknowable'] += 1

@@ -8,7 +8,8 @@ loses up to 20 % of the frames and delays some by up to 5 s, out of order. Judge
 of the simulator and the link. `flyable` counts the tasks of flights at whose end the bridge
 controls the aircraft, `completed` those of them that it reported. `flown_twice` counts the tasks
 flown again though a frame was delivered that shows that they were flown (see `flight_evidence`);
-`flown_again_unknowable` those of which no such frame was delivered. --ways 0.5 gives half of the
+`flown_again_unknowable` those of which no such frame was delivered; `flown_again_killed` those
+that others let a killed vehicle fly again before it was handed back. --ways 0.5 gives half of the
 tasks a way: reported without having been flown from end to end it is `false_completed`;
 `way_points_again` counts points of ways that were flown again, as after a doubt. `errors` are
 those that the bridge has caught, with which it has dropped a message or a list.
@@ -247,7 +248,7 @@ class Flight:
         flight, choice = self.vehicle.flight, self.rng.random()
         if not self.airborne or choice < 0.6 or flight.failsafes or self.judge.stubborn:
             if world.hand_over() == '':
-                self.judge.handed_back()
+                self.judge.handed_back(by_service=True)
         elif choice < 0.8:
             self.vehicle.rc_mode(MISSION[self.kind])
             self.judge.stubborn = True  # the next try is by the service
@@ -336,7 +337,8 @@ def main() -> int:
             print(f'\r{done}/{args.flights} flights ', end='', file=sys.stderr)
     print(file=sys.stderr)
     names = ('flights', 'takeovers', 'failsafes', 'reboots', 'restarts', 'handed_back',
-             'completed', 'flyable', *WRONG, 'errors', 'flown_again_unknowable')
+             'completed', 'flyable', *WRONG, 'errors', 'flown_again_unknowable',
+             'flown_again_killed')
     result = {name: total[name] for name in (*names, *sorted(set(total) - set(names)))}
     result |= {'seed': args.seed, 'lossy': args.lossy}
     for name, value in result.items():

@@ -179,11 +179,12 @@ def judged(rows):
         system_status=d.MAV_STATE_STANDBY)
     world = SimpleNamespace(now=0.0, vehicle=SimpleNamespace(flight=flight), events=[],
                             tasks=None, state=None, authority=AuthorityState.UNKNOWN)
-    judge = Judge(world, 'px4', {})
+    judge = Judge(world, 'px4', {'A': PLACE, 'B': AWAY})
     for now, events, frame, sent in rows:
         world.now = now
-        world.truth = [TruthEvent(now, name, AWAY, mode=mode, cause=cause)
-                       for name, cause, mode in events]
+        world.truth = [TruthEvent(
+            now, name, AWAY if cause == 'B' else PLACE, mode=mode, cause=cause, seq=0)
+            for name, cause, mode in events]
         for name, _, _ in events:
             flight.armed = {'armed': True, 'disarmed': False}.get(name, flight.armed)
         world.delivered = [(now, frame)] if frame else []
@@ -238,6 +239,20 @@ def test_a_mode_set_before_a_frame_showed_the_end_of_the_boot_may_be_of_the_boot
         (15.0, [('mode', 'pilot', px4_mode(2))], None, None),
         (16.0, [], heartbeat(False), None), (17.0, [], None, arm_command())])
     assert bool(counts['overridden']) is overridden
+
+
+@pytest.mark.parametrize(('kill', 'counted'), [
+    (None, 'flown_twice'),
+    (heartbeat(False, d.MAV_STATE_FLIGHT_TERMINATION), 'flown_again_killed')])
+def test_what_a_pilot_lets_a_killed_vehicle_fly_again_is_counted_apart(kill, counted):
+    shown = d.MAVLink_mission_item_reached_message(0)
+    counts = judged([
+        (1.0, [('armed', OURS, None), ('item_reached', 'A', None)], heartbeat(True), None),
+        (1.1, [], shown, None), (2.0, [('item_reached', 'B', None)], kill, None),
+        (3.0, [('mode', 'pilot', px4_mode(4, 4))], heartbeat(True), None),
+        (4.0, [('item_reached', 'A', None)], None, arm_command())])
+    assert counts[counted] == 1
+    assert counts['flown_twice'] + counts['flown_again_killed'] == 1
 
 
 def fly_random(monkeypatch, number, break_bridge):
