@@ -182,7 +182,8 @@ class CurrentItem:
             self._flew_until = frame
         reports, epoch = self.reports, self._epoch
         reports.previous_frame = reports.last_frame
-        if not flying and seq == epoch.current and frame is not None:
+        # the last item stays current once it is reached
+        if not flying and seq == epoch.current and seq < epoch.last_flown and frame is not None:
             self._unflown_until = self._positions.sent_between(frame)[0]
         if not reports.is_old(seq, now, frame):
             self._move(seq, now, flying, frame)

@@ -102,7 +102,14 @@ class PositionHistory:
         self._stamps.clear()
 
     def vehicle_time(self, now: float) -> float:
-        """Vehicle time [s] at our steady time [s]; a simulated clock may be faster than ours."""
+        """Return the time of the vehicle's clock; a simulated one may be faster than ours.
+
+        Args:
+            now: steady time [s].
+
+        Returns:
+            Vehicle time [s].
+        """
         if not self._clocks:
             return -math.inf
         at = bisect_right(self._clocks, now, key=lambda one: one[0])

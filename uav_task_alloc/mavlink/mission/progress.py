@@ -47,6 +47,7 @@ class ProgressTable:
         frame: number of its frame; None: not known.
         flying: the vehicle is in mission mode.
         restarted: the mission began again from its first item.
+        flew: it was in mission mode, and has left it since.
         task, tasks: ids.
     """
 
