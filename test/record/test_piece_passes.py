@@ -120,12 +120,14 @@ def test_a_strip_flown_in_parts_and_then_whole_is_flown_twice():
     assert len(piece_passes(run(), flown(*ways))['field#1']) == 2
 
 
+@pytest.mark.parametrize('stayed', [0.5, 30.0])  # [s]
 @pytest.mark.parametrize(('items', 'twice'), [((0.0,), 0), ((0.0, 200.0), 1)])
-def test_a_lost_vehicle_has_flown_a_strip_where_it_reached_the_end(items, twice):
+def test_a_lost_vehicle_has_flown_a_strip_where_it_reached_the_end(items, twice, stayed):
     truth = flown(*BOTH)
     truth.tracks['lost'] = [TrueSample(20.0 * k, (x, 40.0, 50.0))
                             for k, x in enumerate((-20.0, 199.0))]
-    truth.died['lost'] = TrueSample(20.5, (199.0, 40.0, 50.0))
+    truth.tracks['lost'].append(TrueSample(20.0 + stayed, (199.0, 40.0, 50.0)))
+    truth.died['lost'] = truth.tracks['lost'][-1]
     truth.reached = [Reached(uav, (x + 20.0) / 10.95, (x, 40.0, 50.0)) for uav, ends in (
         ('u1', (0.0, 200.0)), ('lost', items)) for x in ends]
     assert len(piece_passes(run(), truth)['field#1']) == 1 + twice

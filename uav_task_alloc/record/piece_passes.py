@@ -69,19 +69,17 @@ def _of_piece(tracks: Mapping[str, Sequence[TrueSample]], truth: GroundTruth,
         return any(row.uav == uav and first - _MOMENT <= row.wall <= last + _MOMENT
                    and math.dist(row.point, end) <= _BESIDE for row in truth.reached)
 
+    def finished(uav: str, first: float, last: float) -> bool:
+        died = truth.died.get(uav)
+        return died is None or died.wall > last + _MOMENT or reaches(
+            uav, min(way[0], way[-1], key=lambda end: math.dist(end, died.point)), first, last)
+
     found = sorted(((uav, first, last) for uav, track in tracks.items()
-                    for first, last in _passes(track, way)
-                    if not _ends_with(truth.died.get(uav), last) or any(
-                        reaches(uav, end, last, last) for end in (way[0], way[-1]))),
+                    for first, last in _passes(track, way) if finished(uav, first, last)),
                    key=lambda row: row[2])
     own = [(uav, first, last) for uav, first, last in found if all(
         reaches(uav, end, first, last) for end in (way[0], way[-1]))]
     return [Reached(uav, last, way[-1]) for uav, _, last in own or found]
-
-
-def _ends_with(died: TrueSample | None, last: float) -> bool:
-    """Whether a vehicle was lost at the end of a pass [unix s]."""
-    return died is not None and died.wall <= last + _MOMENT
 
 
 def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[tuple[float, float]]:
