@@ -2,9 +2,13 @@
 """Messages are requested at their rates, again when missing, a bounded number of times."""
 import pytest
 from flight_bench import FlightBench
+from mission_bench import ORIGIN, OURS
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.autopilots import PX4
 from uav_task_alloc.mavlink.gcs.message_rates import MAX_REQUESTS
+from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.transport.codec import Codec
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 SPEC = {'GLOBAL_POSITION_INT': 5.0, 'MISSION_CURRENT': 2.0, 'BATTERY_STATUS': 1.0,
@@ -81,3 +85,18 @@ def test_positions_that_never_came_are_requested_until_they_come(kind):
     bench.line.tampers.clear()
     bench.run(limit=30.0)
     assert len(requested_rates(bench, 'GLOBAL_POSITION_INT')) <= asked + 1
+
+
+@pytest.mark.parametrize('others', [100, 130, 200, 255, 400])
+def test_a_message_is_not_late_whose_kind_is_rare_among_many_frames(others):
+    telemetry, sends, receives = Telemetry(PX4, ORIGIN, 0.0), Codec(1, 1), Codec(*OURS)
+
+    def receive(message, now):
+        for decoded in receives.parse(sends.pack(message)):
+            telemetry.receive(decoded, now)
+
+    for second in range(5):
+        for n in range(others):
+            receive(d.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0), second + n / others)
+        receive(d.MAVLink_mission_current_message(second), second + 1.0)
+        assert telemetry.current == second

@@ -17,7 +17,7 @@ from uav_task_alloc.model import Point
 STALE, LOST = 3.0, 10.0  # [s] without a message
 _QUIET, _STEADY = 2.0, 10.0  # [s] a link is good with no gap of _QUIET for _STEADY
 _IN_MISSION = 1  # MISSION_CURRENT.mission_mode; 0: not known
-_ORDERED = 5.0  # [s] in which sequence numbers order two frames
+_ORDERED = 5.0  # [s] in which the numbers of two frames order them
 _REPORTED = 3.0  # [s] until a vehicle without estimator or GPS reports is trusted
 _BATTERY_TIMEOUT = 10.0  # [s] without a report: the battery does not count
 _BATTERY_RISE = 0.03  # [0..1] smallest accepted rise of a battery reading
@@ -91,7 +91,7 @@ class Telemetry:
         self.clock_rate = ClockRate()
         self.frames = FrameLog()
         self.frame = 0  # frame number of the latest message
-        self._newest: dict[str, tuple[int, float]] = {}  # sequence number and time [s] by type
+        self._newest: dict[str, tuple[int, float]] = {}  # number of a frame and time [s] by type
         self._first_at: float | None = None  # [s] of the first position
         # of its position; it has finished booting; was on the ground since it was in mission mode
         self._fix = self._estimates = self._started = self._landed_since_mission = False
@@ -195,15 +195,15 @@ class Telemetry:
         if now - self.received_at > _QUIET:
             self._gap_at = now
         self.received_at = now
+        boot = getattr(message, 'time_boot_ms', None)
+        if boot is not None:
+            self._clock(boot, now)  # first, as a restart begins other frame numbers
         if skipped := getattr(message, 'skipped', ()):
             self.frames.note_all((seq for system, seq in skipped
                                   if system == message.get_srcSystem()), now)
         self.frame = self.frames.note(message.get_seq(), now)
         self.received_ids.add(message.get_msgId())
         self.received_last[message.get_msgId()] = now
-        boot = getattr(message, 'time_boot_ms', None)
-        if boot is not None:
-            self._clock(boot, now)
         if message.get_type() in _STATES and not self._is_newest(message, now):
             return False
         handler = self._handlers.get(message.get_type())
@@ -229,13 +229,15 @@ class Telemetry:
         self._batteries.clear()
 
     def _is_newest(self, message: Message, now: float) -> bool:
-        """By the sequence number of its frame: links may deliver out of order."""
+        """By the number of its frame: links may deliver out of order.
+
+        Not by its sequence number: hundreds of frames may come between two of a type.
+        """
         kind = message.get_type() + str(getattr(message, 'id', ''))
-        seq = message.get_seq()
-        newest, received_at = self._newest.get(kind, (seq, now))
-        if now - received_at < _ORDERED and (seq - newest) % 256 > 128:
+        newest, received_at = self._newest.get(kind, (self.frame, now))
+        if now - received_at < _ORDERED and self.frame < newest:
             return False
-        self._newest[kind] = seq, now
+        self._newest[kind] = self.frame, now
         return True
 
     def _clock(self, boot_ms: int, now: float) -> None:
