@@ -12,8 +12,8 @@ unexport MAKEFLAGS
 # some containers set it: then each process would compile the sources again, each test worker the tests
 unexport PYTHONDONTWRITEBYTECODE
 
-# node tests wait more than they compute: two have those, two compute
-WORKERS := 4
+# node tests wait more than they compute: two have those, three compute
+WORKERS := 5
 # Ctrl-C ends a recipe, without what the programs in it report about that
 STOP := trap 'exit 130' INT
 ENV := . .ros/setup.sh
