@@ -42,9 +42,10 @@ COMPASS_OFS2_Z -18
 
 
 class ServedFleet(UdpFleet):
-    """Its time passes while it is served: on a busy machine nothing is flown past the bridge."""
+    """Its time passes while it is served: on a busy machine neither flies past the other."""
 
     TURN = 0.02  # [s] wall, at most for each turn of the bridge
+    AHEAD = 1.0  # [s] vehicle time, at most, by which the bridge is ahead of the vehicles
 
     def __init__(self, *args):
         super().__init__(*args)
@@ -62,7 +63,8 @@ class ServedFleet(UdpFleet):
         """Vehicle time [s]."""
         with self._clock:
             wall = min(time.monotonic(), self._end)
-            self._now += max(0.0, wall - self._last) * self.speedup
+            later = self._now + max(0.0, wall - self._last) * self.speedup
+            self._now = max(self._now, min(later, self._stepped + self.AHEAD))
             self._last = max(wall, self._last)
             return self._now
 

@@ -42,3 +42,40 @@ def test_a_transfer_is_given_up_by_the_clock_of_the_vehicle(rate, seconds):
         message, = codec.parse(codec.pack(d.MAVLink_system_time_message(0, int(100 * rate * k))))
         telemetry.receive(message, 0.1 * k)
     assert telemetry.idle_after() == pytest.approx(seconds, rel=0.01)
+
+
+def clocked(telemetry, boot_ms, now):
+    message, = Codec(1, 1).parse(Codec(1, 1).pack(d.MAVLink_system_time_message(0, int(boot_ms))))
+    telemetry.receive(message, now)
+
+
+@pytest.fixture
+def flying():
+    """A vehicle that has run for 60 s, up to the time 6 s."""
+    telemetry = Telemetry(PROFILES['px4'], ORIGIN, 0.0)
+    for k in range(60):
+        clocked(telemetry, 54000 + 100 * k, 0.1 * k)
+    return telemetry
+
+
+@pytest.mark.parametrize('silence', [7.0, 10.0, 60.0])
+def test_buffered_messages_in_order_are_no_restart(flying, silence):
+    for k in range(int(5 * silence)):  # 5 Hz, all delivered within 0.8 s
+        clocked(flying, 60000 + 200 * k, 6.0 + silence + 0.8 * k / (5 * silence))
+    for k in range(20):
+        clocked(flying, 60800 + 1000 * silence + 200 * k, 6.8 + silence + 0.2 * k)
+    assert flying.restarts == 0
+
+
+def test_a_restart_in_a_long_silence_shows_by_a_clock_that_stays_behind(flying):
+    for k in range(8):  # 90 s of silence; it has run for 70 s: ahead of the clock before
+        clocked(flying, 70000 + 200 * k, 96.0 + 0.2 * k)
+    assert flying.restarts == 1
+    assert flying.booted_at == pytest.approx(26.0, abs=0.1)
+
+
+def test_a_restart_shows_by_two_clocks_that_went_back(flying):
+    clocked(flying, 3000, 13.0)
+    assert flying.restarts == 0
+    clocked(flying, 3200, 13.2)
+    assert flying.restarts == 1

@@ -23,6 +23,7 @@ _BATTERY_TIMEOUT = 10.0  # [s] without a report: the battery does not count
 _BATTERY_RISE = 0.03  # [0..1] smallest accepted rise of a battery reading
 _RESTART_STEP = 2000  # [ms] decrease of time_boot_ms that shows a restart, not a late message
 _MAX_DELAY = 6.0  # [s] of a late message
+_CATCH_UP = 1.0  # [s] in which a link delivers what it has buffered in a silence
 _IN_AIR = frozenset({
     d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING})
 _SIMULATED = 2.0  # seconds of its clock in one of this program: a simulator that runs faster
@@ -76,7 +77,7 @@ class Telemetry:
         self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
         self.unhealthy = ''  # text on failing prearm checks; '': none reported
         self.current: int | None = None  # seq on the wire
-        self.current_at = -math.inf  # [s]
+        self.current_at = self._gap_at = -math.inf  # [s] of it; end of the latest gap of _QUIET
         self.reached: int | None = None  # seq on the wire, latest
         self.total: int | None = None  # number of items as the vehicle reports it
         self.mission_state = 0  # MISSION_STATE
@@ -87,7 +88,7 @@ class Telemetry:
         self.received_last: dict[int, float] = {}  # [s] by message id
         self.restarts, self.booted_at = 0, -math.inf  # how many; [s] the latest, or earlier
         self.boot_ms = self._older_clocks = 0  # [ms] time_boot_ms; messages in a row before it
-        self._boot_at, self._gap_at = now, -math.inf  # [s]; end of the latest gap of _QUIET
+        self._boot_at = self._older_at = now  # [s]; of the first message in a row before it
         self.clock_rate = ClockRate()
         self.frames = FrameLog()
         self.frame = 0  # frame number of the latest message
@@ -244,6 +245,8 @@ class Telemetry:
         """Detect a restart: two messages in a row with an older clock, as one may be late.
 
         If late messages may be as old as that, no message on time may follow for a while.
+        A clock that has only advanced less than the silence shows a restart if it does not
+        catch up: a link may deliver in order what it has buffered.
         """
         silence = now - self._boot_at  # a running clock advances by that
         least = self.boot_ms - _RESTART_STEP + 500.0 * silence
@@ -253,8 +256,11 @@ class Telemetry:
             if boot_ms == self.boot_ms:
                 self.clock_rate.add(1e-3 * boot_ms, now)
             return
+        if self._older_clocks == 0:
+            self._older_at = now
         self._older_clocks += 1
-        if self._older_clocks >= 2 and (
+        went_back = boot_ms < self.boot_ms - _RESTART_STEP
+        if self._older_clocks >= 2 and (went_back or now - self._older_at >= _CATCH_UP) and (
                 boot_ms < least - 1000.0 * _MAX_DELAY or silence > _MAX_DELAY):
             self._boot_at = now
             rate = self.clock_rate.value
