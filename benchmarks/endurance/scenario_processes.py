@@ -7,7 +7,7 @@ import random
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from uav_task_alloc_msgs import msg as m
 
@@ -32,13 +32,11 @@ from uav_task_alloc.nodes.fleet_sim import vehicle_config
 from uav_task_alloc.params import AllocatorParams, BridgeParams, FleetSimParams
 from uav_task_alloc.record import message_records
 from uav_task_alloc.record.ground_truth import GroundTruth
+from uav_task_alloc.scenario import Scenario
 from uav_task_alloc.sim.separation_judge import Loss, SeparationJudge, TrueState
 from uav_task_alloc.sim.vehicle import AUTOPILOTS, Vehicle
 from uav_task_alloc.solver.solve import plan
 from uav_task_alloc.zone_codec import decode_zone_array
-
-if TYPE_CHECKING:
-    from scenario_flights import Run
 
 EPOCH = 1_700_000_000.0  # [unix s] of /clock at the start
 TIMER = 0.05  # [s] of the bridge
@@ -47,6 +45,34 @@ ROUNDS = 60  # of bees in one solve
 # wall time [s]: between two stalls of a process, of one, of the longest; each times the load
 STALL_EVERY, STALL, LONGEST = 0.6, 0.12, 1.5
 LATENCY, SOLVE = (0.0005, 0.004), (0.004, 0.06)  # [s] wall time of a message, of a solve
+
+
+class Flight(Protocol):
+    """What the processes use of the flight that they are parts of: clocks, links and topics."""
+
+    played: Scenario
+    rng: random.Random
+    load: float
+    wall: float  # [s]
+    vehicle_time: float  # [s]
+
+    @property
+    def stamp(self) -> float:
+        """The published clock [s]."""
+
+    def to_bridge(self, n: int, frame: bytes) -> None: ...
+
+    def to_vehicle(self, n: int, frame: bytes) -> None: ...
+
+    def on_event(self, msg: m.TaskEvent) -> None: ...
+
+    def on_state(self, msg: m.UavState) -> None: ...
+
+    def on_list(self, msg: m.TaskList) -> None: ...
+
+    def on_hold(self, msg: m.UavHold) -> None: ...
+
+    def record(self, body: dict[str, Any]) -> None: ...
 
 
 def solve(*world: object, max_iterations: int | None, **how: object) -> Plan:
@@ -87,7 +113,7 @@ class Process:
 class Fleet:
     """The simulated vehicles, and their log as the judge reads it."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Flight) -> None:
         self.run, played = run, run.played
         self.vehicles = {uav.system_id: Vehicle(
             vehicle_config(uav, played, FleetSimParams()), AUTOPILOTS[uav.autopilot])
@@ -153,7 +179,7 @@ class Fleet:
 class Bridge:
     """What the bridge's node does with its ground station."""
 
-    def __init__(self, run: Run, params: BridgeParams) -> None:
+    def __init__(self, run: Flight, params: BridgeParams) -> None:
         self.run, self.params = run, params
         self.config = bridge_parameters.to_gcs_config(params)
         self.limits = bridge_parameters.to_uav_limits(params.uav_limits)
@@ -234,7 +260,7 @@ class Bridge:
 class AllocatorProcess:
     """What the allocator's node does with its core."""
 
-    def __init__(self, run: Run, params: AllocatorParams) -> None:
+    def __init__(self, run: Flight, params: AllocatorParams) -> None:
         self.run, self.params = run, params
         self.core = Allocator(params, 0.0)
         self.core.set_kernels_ready()
