@@ -9,8 +9,10 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink import autopilots as profiles
 from uav_task_alloc.mavlink.autopilots import ModeFunction, profile_of
+from uav_task_alloc.mavlink.mission.item import alike
 from uav_task_alloc.mavlink.mission.items import mission_items
 from uav_task_alloc.mavlink.mission.peer import Peer
+from uav_task_alloc.sim.stored_item import StoredItem, stored_by_ardupilot
 
 ALL = pytest.mark.parametrize('profile', [
     profiles.ARDUPILOT, profiles.ARDUPLANE, profiles.PX4, profiles.PX4_PLANE, profiles.GENERIC])
@@ -63,6 +65,21 @@ def test_the_return_is_sent_in_the_frame_that_the_store_takes(profile):
     items = mission_items(task_list('A', returns=True), profile.rules, ORIGIN)
     assert items[-1].command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH
     assert items[-1].frame == (3 if profile.name == 'ardupilot' else 2)
+
+
+@pytest.mark.parametrize('profile', [profiles.ARDUPILOT, profiles.ARDUPLANE])
+def test_what_ardupilot_keeps_of_a_mission_is_alike(profile):
+    tasks = dataclasses.replace(task_list('AB', service=2.5, returns=True),
+                                end_via=((3.0, 4.0, 60.0),))
+    for item in mission_items(tasks, profile.rules, ORIGIN, (3.0, 4.0, 1.0)):
+        kept = stored_by_ardupilot(StoredItem(
+            item.frame, item.command, *item.params, item.x, item.y, item.z))
+        held = dataclasses.replace(item, frame=kept.frame, x=kept.x, y=kept.y, z=kept.z,
+                                   params=(kept.p1, kept.p2, kept.p3, kept.p4))
+        assert alike(item, held), item
+        turned = dataclasses.replace(held, params=tuple(-value for value in held.params))
+        assert item.command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH or not any(
+            held.params) or not alike(item, turned)
 
 
 @pytest.mark.parametrize('profile', [

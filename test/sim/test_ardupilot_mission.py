@@ -94,6 +94,26 @@ def test_loiter_time_is_cut_to_whole_seconds(bench):
     assert sent_back(bench, item(d.MAV_CMD_NAV_LOITER_TIME, A, p1=3.7)).param1 == 3.0
 
 
+@pytest.mark.parametrize(('command', 'sent', 'read'), [
+    (d.MAV_CMD_NAV_LAND, {'p1': 2.5, 'p4': 0.0}, (2.0, 0.0, 0.0, 1.0)),
+    (d.MAV_CMD_NAV_LAND, {'p4': -0.5}, (0.0, 0.0, 0.0, -1.0)),
+    (d.MAV_CMD_NAV_LOITER_TIME, {'p1': 3.0}, (3.0, 0.0, 1.0, 0.0)),
+    (d.MAV_CMD_NAV_LOITER_TIME, {'p3': -9.0, 'p4': 0.5}, (0.0, 0.0, -1.0, 1.0)),
+    (d.MAV_CMD_NAV_LOITER_UNLIM, {'p1': 7.0, 'p3': -9.5}, (0.0, 0.0, -9.0, 0.0)),
+])
+def test_a_direction_is_kept_as_1_or_its_opposite(bench, command, sent, read):
+    held = sent_back(bench, item(command, A, **sent))
+    assert (held.param1, held.param2, held.param3, held.param4) == read
+
+
+def test_a_direction_of_turning_and_the_time_of_a_delay_keep_their_sign(bench):
+    turned = sent_back(bench, item(d.MAV_CMD_CONDITION_YAW, p1=90.0, p3=-1.0))
+    assert (turned.param1, turned.param3) == (90.0, -1.0)
+    delayed = sent_back(bench, item(d.MAV_CMD_NAV_DELAY, p1=0.5, p2=-1.0, p3=2.5, p4=30.0))
+    assert (delayed.param1, delayed.param2, delayed.param3, delayed.param4) == (
+        0.5, -1.0, 2.0, 30.0)
+
+
 def test_altitude_is_kept_to_a_centimetre(bench):
     sent = waypoint(A, frame=3)
     sent.z = 30.127

@@ -25,10 +25,10 @@ YAW = dialect.MAV_CMD_CONDITION_YAW
 FLOWN_TO = {WAYPOINT, LOITER_UNLIMITED, _LOITER_TIME, LAND, TAKEOFF}
 POSITIONAL = FLOWN_TO | {ROI}
 # carried out at once, on the way; and how many bits ArduPilot keeps of each parameter: 0 none,
-# 32 a float
+# 32 a float, below 0 with a sign
 _ARDUPILOT_BITS: dict[int, tuple[int, int, int, int]] = {
     CHANGE_SPEED: (8, 32, 32, 0),
-    YAW: (32, 32, 8, 8),
+    YAW: (32, 32, -8, 8),
     dialect.MAV_CMD_DO_SET_SERVO: (8, 16, 0, 0),
     dialect.MAV_CMD_DO_GRIPPER: (8, 8, 0, 0),
     dialect.MAV_CMD_DO_MOUNT_CONTROL: (32, 32, 32, 0),
@@ -40,6 +40,7 @@ _ARDUPILOT_BITS: dict[int, tuple[int, int, int, int]] = {
     dialect.MAV_CMD_VIDEO_STOP_CAPTURE: (8, 0, 0, 0),
 }
 AT_ONCE = {*_ARDUPILOT_BITS, ROI}
+_DELAY_BITS = 32, -8, -8, -8
 _FLOWN = FLOWN_TO | {RETURN, DELAY}
 _KNOWN = _FLOWN | AT_ONCE
 _PX4_KNOWN = _KNOWN - {YAW, dialect.MAV_CMD_DO_SET_SERVO}
@@ -156,7 +157,8 @@ def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
     if item.command not in _KNOWN:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED)
     if item.command not in POSITIONAL:
-        bits = _ARDUPILOT_BITS.get(item.command, (32 if item.command == DELAY else 0, 0, 0, 0))
+        bits = _ARDUPILOT_BITS.get(
+            item.command, _DELAY_BITS if item.command == DELAY else (0, 0, 0, 0))
         p1, p2, p3, p4 = (_kept(value, width) for value, width in zip(
             (item.p1, item.p2, item.p3, item.p4), bits, strict=True))
         z = (float(dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING)
@@ -169,14 +171,29 @@ def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
     if abs(item.y) > 180 * 10**7:
         return Refusal(dialect.MAV_MISSION_INVALID_PARAM6_Y)
     centimetres = math.trunc(item.z * 100.0 + math.copysign(1e-3, item.z))
-    return StoredItem(_ARDUPILOT_FRAMES[item.frame], item.command, float(math.trunc(item.p1)),
-                      0.0, 0.0, 0.0, item.x, item.y, centimetres / 100.0)
+    p1, p3, p4 = _ardupilot_point(item)
+    return StoredItem(_ARDUPILOT_FRAMES[item.frame], item.command, p1, 0.0, p3, p4, item.x, item.y,
+                      centimetres / 100.0)
+
+
+def _ardupilot_point(item: StoredItem) -> tuple[float, float, float]:
+    """What ArduPilot keeps of param1, param3 and param4 of an item with a position."""
+    whole = float(math.trunc(item.p1) % 2**16)
+    if item.command == LOITER_UNLIMITED:
+        return 0.0, float(math.trunc(item.p3)), 0.0  # the radius, below 0 counter-clockwise
+    if item.command == _LOITER_TIME:
+        return whole, -1.0 if item.p3 < 0.0 else 1.0, float(item.p4 > 0.0)
+    if item.command == LAND:
+        return whole, 0.0, -1.0 if item.p4 < 0.0 else 1.0
+    return whole, 0.0, 0.0
 
 
 def _kept(value: float, bits: int) -> float:
     """A parameter as ArduPilot keeps it in so many bits."""
     if bits == 32:
         return value
+    if bits < 0:
+        return float((math.trunc(value) + 2**(-bits - 1)) % 2**-bits - 2**(-bits - 1))
     return float(math.trunc(value) % 2**bits) if bits else 0.0
 
 

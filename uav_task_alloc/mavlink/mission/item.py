@@ -29,7 +29,8 @@ _FRAME_READ_BACK = {  # ArduPilot returns an _INT frame as the one without it
 _ALTITUDE_STEP = 0.011  # [m] ArduPilot keeps whole centimetres
 # commands that fly home and land by themselves, at the end of a mission
 ENDS_AT_HOME = frozenset({dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, dialect.MAV_CMD_NAV_LAND})
-
+# index of the parameter that ArduPilot returns as 1, clockwise, where it was sent as 0
+_DIRECTION = {dialect.MAV_CMD_NAV_LAND: 3, dialect.MAV_CMD_NAV_LOITER_TIME: 2}
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +96,7 @@ def alike(sent: Item, held: Item) -> bool:
     """
     if sent.command in ACTION_COMMANDS:
         return sent.command == held.command and _same_action(sent, held)
-    if sent.command != held.command or not _params_alike(sent.params, held.params):
+    if sent.command != held.command or not _params_alike(_with_direction(sent, held), held.params):
         return False
     if sent.command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH:
         return True
@@ -110,6 +111,14 @@ def _same_action(sent: Item, held: Item) -> bool:
                 for a, b in zip(sent.params, held.params, strict=True))
             and abs(sent.x - held.x) <= 1 and abs(sent.y - held.y) <= 1
             and abs(sent.z - held.z) <= _ALTITUDE_STEP)
+
+
+def _with_direction(sent: Item, held: Item) -> Sequence[float]:
+    """The parameters of an item sent, with the direction that ArduPilot returns for none."""
+    n = _DIRECTION.get(sent.command)
+    if n is None or sent.params[n] != 0.0 or held.params[n] != 1.0:
+        return sent.params
+    return *sent.params[:n], 1.0, *sent.params[n + 1:]
 
 
 def _params_alike(sent: Sequence[float], held: Sequence[float]) -> bool:
