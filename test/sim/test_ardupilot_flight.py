@@ -145,6 +145,27 @@ def test_a_resumed_mission_goes_on_at_the_item_it_flew(bench):
     assert reached(bench.received) == [1, 2]
 
 
+def test_a_stopped_mission_is_reported_as_not_started(bench):
+    bench.fly(waypoint(A), waypoint(FAR))
+    bench.reach(0)
+    bench.set_mode(FlightMode.GUIDED)
+    current = mission_current(bench)
+    assert (current.seq, current.mission_state) == (2, d.MISSION_STATE_NOT_STARTED)
+    assert current.mission_mode == 0
+
+
+def test_a_current_item_set_after_the_end_stops_the_mission_in_auto(bench):
+    bench.fly(waypoint(A))
+    bench.reach(0)
+    bench.set_current(1)
+    bench.pass_time(5.0)
+    current = mission_current(bench)
+    assert (current.mission_state, current.mission_mode) == (d.MISSION_STATE_NOT_STARTED, 1)
+    assert bench.set_mode(FlightMode.MISSION) == 0  # it is in AUTO already
+    bench.pass_time(5.0)
+    assert mission_current(bench).mission_state == d.MISSION_STATE_NOT_STARTED
+
+
 def test_set_current_while_held_chooses_where_auto_goes_on(bench):
     bench.fly(waypoint(A), waypoint(B), waypoint(C))
     bench.set_mode(FlightMode.GUIDED)

@@ -44,7 +44,7 @@ def test_the_last_item_is_set_once_while_the_vehicle_still_reports_the_end(kind)
     bench = flying(kind, 'AB')
 
     def complete(direction, m, now):
-        if m.get_type() == 'MISSION_CURRENT' and m.mission_state == d.MISSION_STATE_PAUSED:
+        if m.get_type() == 'MISSION_CURRENT' and m.mission_state == d.MISSION_STATE_NOT_STARTED:
             m.mission_state = d.MISSION_STATE_COMPLETE
     bench.line.tampers.append(complete)
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 100.0)
@@ -66,3 +66,19 @@ def test_a_list_waits_for_the_end_of_a_set_current_that_a_link_delays(kind, dela
     bench.assign(task_list('CDEF', 3))
     flown_once_each(bench, 'ABCDEF')
     assert places(bench) == list('ABCDEF')
+
+
+@ARDUPILOT
+def test_a_mission_reported_once_as_not_started_flies_on(kind):
+    bench = flying(kind, 'ABC')
+    told = []
+
+    def once(direction, m, now):
+        if m.get_type() == 'MISSION_CURRENT' and not told:
+            told.append(m)
+            m.mission_state = d.MISSION_STATE_NOT_STARTED
+    bench.line.tampers.append(once)
+    before = commanded(bench)
+    flown_once_each(bench, 'ABC')
+    assert told
+    assert commanded(bench) == before

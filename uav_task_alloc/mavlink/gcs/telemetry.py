@@ -17,6 +17,7 @@ from uav_task_alloc.model import Point
 STALE, LOST = 3.0, 10.0  # [s] without a message
 _QUIET, _STEADY = 2.0, 10.0  # [s] a link is good with no gap of _QUIET for _STEADY
 _IN_MISSION = 1  # MISSION_CURRENT.mission_mode; 0: not known
+_NOT_FLOWN = {d.MISSION_STATE_NOT_STARTED, d.MISSION_STATE_PAUSED}  # ArduPilot sends the first
 _ORDERED = 5.0  # [s] in which the numbers of two frames order them
 _REPORTED = 3.0  # [s] until a vehicle without estimator or GPS reports is trusted
 _BATTERY_TIMEOUT = 10.0  # [s] without a report: the battery does not count
@@ -83,6 +84,7 @@ class Telemetry:
         self.mission_state = 0  # MISSION_STATE
         self._mode_frame = self._in_mission_frame = 0  # numbers; shows the mode, MISSION (CURRENT)
         self.mission_restarted = self.mission_ended = self.mission_stopped = False  # by reports
+        self._was_stopped = False  # by the last report
         self.plan_id = 0  # PX4's id of the onboard mission
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
@@ -364,9 +366,9 @@ class Telemetry:
                 self.mission_state == d.MISSION_STATE_ACTIVE)
             self.mission_ended = self.mission_state == complete and (
                 before not in (complete, d.MISSION_STATE_UNKNOWN))
-            # not flown, though it is in mission mode
-            self.mission_stopped = self.mission_state == d.MISSION_STATE_PAUSED and (
-                message.mission_mode == _IN_MISSION)
+            # not flown, though it is in mission mode; one report may be of the moment it began
+            stopped = self.mission_state in _NOT_FLOWN and message.mission_mode == _IN_MISSION
+            self.mission_stopped, self._was_stopped = stopped and self._was_stopped, stopped
             if message.mission_mode == _IN_MISSION:
                 self._in_mission_frame = self.frame
         self.plan_id = plan_id(message)

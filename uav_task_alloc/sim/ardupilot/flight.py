@@ -22,12 +22,21 @@ _FIRST_PREARM, _PREARM_PERIOD = 15.0, 30.0  # [s] after power-up; between texts
 
 
 class MissionRunState(Enum):
-    """State of the mission, with the values of MISSION_CURRENT.mission_state."""
+    """State of the mission."""
 
-    NOT_STARTED = 2
-    ACTIVE = 3
-    STOPPED = 4
-    COMPLETE = 5
+    NOT_STARTED = 'not started'
+    ACTIVE = 'active'
+    STOPPED = 'stopped'
+    COMPLETE = 'complete'
+
+
+# of MISSION_CURRENT: a stopped mission is reported as one that has not started
+_REPORTED_STATES = {
+    MissionRunState.NOT_STARTED: dialect.MISSION_STATE_NOT_STARTED,
+    MissionRunState.ACTIVE: dialect.MISSION_STATE_ACTIVE,
+    MissionRunState.STOPPED: dialect.MISSION_STATE_NOT_STARTED,
+    MissionRunState.COMPLETE: dialect.MISSION_STATE_COMPLETE,
+}
 
 
 class ArduPilotFlight(VehicleFlight):
@@ -56,6 +65,11 @@ class ArduPilotFlight(VehicleFlight):
         self._upcoming = 1  # seq where the search for the next flown item begins
         self._waiting: list[int] = []  # commands still to be carried out on this leg
         self._prearm_at = now + _FIRST_PREARM
+
+    @property
+    def mission_state(self) -> int:
+        """MISSION_STATE of the stored mission."""
+        return int(_REPORTED_STATES[self.run])
 
     def arming_refusal(self) -> str:
         mode, number = self.modes[self.custom_mode], self.custom_mode

@@ -80,10 +80,10 @@ class ArduPilotMissionServer(MissionServer):
         return self.flight.home_item() if seq == 0 else self.items[seq]
 
     def progress(self) -> tuple[int, int, int]:
+        in_mission = int(self.flight.mode is FlightMode.MISSION)  # never 2, suspended
         if len(self.items) < 2:
-            return 0, 1, 2  # MISSION_STATE_NO_MISSION
-        return (len(self.items) - 1, self.flight.run.value,
-                1 if self.flight.mode is FlightMode.MISSION else 2)
+            return 0, dialect.MISSION_STATE_NO_MISSION, in_mission
+        return len(self.items) - 1, self.flight.mission_state, in_mission
 
     def step(self, now: float) -> None:
         self.load()
