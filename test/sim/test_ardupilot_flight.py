@@ -42,7 +42,7 @@ def test_224_sets_the_current_item(bench):
     bench.load(waypoint(A), waypoint(B))
     assert bench.command(d.MAV_CMD_DO_SET_MISSION_CURRENT, 2) == 0
     assert mission_current(bench).seq == 2
-    assert bench.command(d.MAV_CMD_DO_SET_MISSION_CURRENT, 7) == d.MAV_RESULT_FAILED
+    assert bench.command(d.MAV_CMD_DO_SET_MISSION_CURRENT, 7) == d.MAV_RESULT_DENIED
 
 
 def test_mission_set_current_sets_it_too(bench):
@@ -166,6 +166,40 @@ def test_a_current_item_set_after_the_end_stops_the_mission_in_auto(bench):
     assert mission_current(bench).mission_state == d.MISSION_STATE_NOT_STARTED
 
 
+def test_a_mission_cut_off_before_the_item_it_flew_begins_again(bench):
+    bench.fly(waypoint(A), waypoint(B), waypoint(FAR))
+    bench.reach(1)
+    bench.set_mode(FlightMode.GUIDED)
+    bench.load(waypoint(C), waypoint(A))
+    bench.received.clear()
+    bench.set_mode(FlightMode.MISSION)
+    bench.until(lambda: mission_current(bench).mission_state == d.MISSION_STATE_COMPLETE)
+    assert reached(bench.received) == [1, 2]
+
+
+@pytest.mark.parametrize(('end', 'seq', 'state'), [
+    (item(d.MAV_CMD_NAV_RETURN_TO_LAUNCH), 0, d.MISSION_STATE_COMPLETE),
+    (item(d.MAV_CMD_NAV_LAND, A), 1, d.MISSION_STATE_ACTIVE),
+])
+def test_a_disarming_resets_the_mission(bench, end, seq, state):
+    bench.fly(waypoint(A), end)
+    bench.until(lambda: not bench.flight.armed)
+    bench.pass_time(5.0)
+    current = mission_current(bench)
+    assert (current.seq, current.mission_state, current.mission_mode) == (seq, state, 1)
+    bench.set_mode(FlightMode.GUIDED)
+    assert mission_current(bench).seq == seq
+
+
+def test_a_landing_in_mid_mission_resets_it(bench):
+    bench.fly(waypoint(A), waypoint(FAR))
+    bench.reach(0)
+    bench.set_mode(FlightMode.LAND)
+    assert mission_current(bench).seq == 2
+    bench.until(lambda: not bench.flight.armed)
+    assert mission_current(bench).seq == 0
+
+
 def test_set_current_while_held_chooses_where_auto_goes_on(bench):
     bench.fly(waypoint(A), waypoint(B), waypoint(C))
     bench.set_mode(FlightMode.GUIDED)
@@ -181,6 +215,16 @@ def test_auto_on_the_ground_needs_a_takeoff_item(bench):
     bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1)
     assert bench.set_mode(FlightMode.MISSION) == d.MAV_RESULT_FAILED
     assert 'Auto: Missing Takeoff Cmd' in texts(bench.received)
+
+
+def test_auto_on_the_ground_needs_a_takeoff_at_the_current_item(bench):
+    bench.load(item(d.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 30.0)), waypoint(A))
+    bench.set_mode(FlightMode.GUIDED)
+    bench.arm()
+    bench.set_current(2)
+    assert bench.set_mode(FlightMode.MISSION) == d.MAV_RESULT_FAILED
+    bench.set_current(1)
+    assert bench.set_mode(FlightMode.MISSION) == 0
 
 
 def test_auto_needs_a_mission(bench):

@@ -124,11 +124,15 @@ class ArduPilotCommands(Commands):
 
     def __init__(self, flight: VehicleFlight, streams: Streams) -> None:
         super().__init__(flight, streams)
-        self.handlers[dialect.MAV_CMD_DO_SET_MISSION_CURRENT] = (
-            lambda p: self._result(self.flight.set_current(int(p[0]))))
+        self.handlers[dialect.MAV_CMD_DO_SET_MISSION_CURRENT] = self._set_current
 
     def custom_mode(self, params: CommandParams) -> int:
         return int(params[1])
+
+    def _set_current(self, p: CommandParams) -> int:
+        seq = int(p[0])
+        return (_DENIED if seq >= len(self.flight.items)
+                else self._result(self.flight.set_current(seq)))
 
     def _takeoff(self, p: CommandParams) -> int:
         return self._result(self.flight.takeoff(self.flight.home[2] + p[6]))

@@ -88,6 +88,18 @@ class ArduPilotFlight(VehicleFlight):
         if reason:
             self.texts.append((CRITICAL, f'PreArm: {reason}'))
 
+    def _stop_motors(self) -> None:
+        was_armed = self.armed
+        super()._stop_motors()
+        if was_armed:
+            self._reset_mission()
+
+    def _reset_mission(self) -> None:
+        """Go back to the start of the mission; one that is active in AUTO begins again."""
+        self.track, self._upcoming, self._waiting = None, 1, []
+        begins = self.mode is FlightMode.MISSION and self.run is MissionRunState.ACTIVE
+        self.seq = (self._flown_from(1) if begins else None) or 0
+
     def takeoff(self, height: float) -> bool:
         if self.mode is not FlightMode.GUIDED or not self.armed or not self.landed:
             return False
@@ -106,7 +118,9 @@ class ArduPilotFlight(VehicleFlight):
         return True
 
     def _first_flown(self) -> int | None:
-        return next((i.command for i in self.items[1:] if i.command not in item_.AT_ONCE), None)
+        """Command that it would fly next: of the current item, or after a reset of the first."""
+        return next((i.command for i in self.items[max(self.seq, 1):]
+                     if i.command not in item_.AT_ONCE | {item_.DELAY}), None)
 
     def leave(self, mode: FlightMode) -> None:
         if mode is FlightMode.MISSION and self.run is MissionRunState.ACTIVE:
@@ -127,8 +141,9 @@ class ArduPilotFlight(VehicleFlight):
         return True
 
     def _resume(self) -> None:
-        if self.run in (MissionRunState.COMPLETE, MissionRunState.NOT_STARTED):
-            self._upcoming = 1  # a completed mission starts again
+        begun = self.run in (MissionRunState.ACTIVE, MissionRunState.STOPPED)
+        if not begun or self.seq >= len(self.items):  # complete, or its item is not stored
+            self._upcoming = 1
         self.run = MissionRunState.ACTIVE
 
     def set_current(self, seq: int) -> bool:
@@ -202,8 +217,9 @@ class ArduPilotFlight(VehicleFlight):
         super().begin_item(seq)
 
     def item_done(self) -> None:
-        if not self._landing:  # it disarms before REACHED would be sent
-            self.report_reached(self.seq, self.target)
+        if self._landing:  # it disarms before REACHED would be sent
+            return
+        self.report_reached(self.seq, self.target)
         self._upcoming = self.seq + 1
         self.next_item()
 
