@@ -2,6 +2,7 @@
 """Authority and the messages sent when pilots and other stations change modes in flight."""
 import pytest
 from authority_bench import (
+    ARDUPILOT,
     BOTH,
     MODES,
     PX4,
@@ -19,7 +20,7 @@ from authority_bench import (
     status_is,
     suspended,
 )
-from mission_bench import task_list
+from mission_bench import OURS, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority import Suspension
@@ -122,6 +123,50 @@ def test_a_climb_that_no_heartbeat_shows_is_no_loss(kind, mode):
     bench = climbing(kind, getattr(MODES[kind], mode))
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 90.0)
     assert not any('LOST' in note for note in bench.notes)
+
+
+def lifted_off(kind, height):
+    """Taken off by the bridge, at this height [m]."""
+    bench = AuthorityBench(kind, tick=0.1).discover()
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] > height, 30.0)
+    return bench
+
+
+@BOTH
+@pytest.mark.parametrize('height', [0.02, 8.0])
+def test_a_climb_that_ends_below_its_height_with_no_other_mode_shown_is_a_loss(kind, height):
+    bench = lifted_off(kind, height)
+    bench.vehicles[1].flight.track = None  # as when a mode was set, and set back, unseen
+    bench.run(limit=6.0)
+    assert bench.authority() is H
+    assert bench.reaches(L, 20.0)
+    assert status_is(bench, L, 'its take-off ended at ', ' m of 50.0 m')
+    assert sends_no_command(bench)
+    assert bench.hand_over() == ''
+    bench.assign(task_list('AB', 9))
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 90.0)
+
+
+@ARDUPILOT
+def test_a_climb_that_a_pilot_ended_before_our_late_mode_command_is_a_loss(kind):
+    bench = lifted_off(kind, 0.02)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    bench.from_station(set_mode(MODES[kind].hold, kind), system=OURS[0])  # no heartbeat between
+    assert bench.reaches(L, 20.0)
+    assert sends_no_command(bench)
+
+
+@BOTH
+@pytest.mark.parametrize('speed', [0.1, 8.0])
+def test_a_climb_is_no_loss_however_slow_it_is_and_without_positions(kind, speed):
+    bench = lifted_off(kind, 0.02)
+    bench.vehicles[1].flight.speed = speed
+    lost_until = bench.now + 12.0
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        m.get_type() == 'GLOBAL_POSITION_INT' and now < lost_until) else None)
+    bench.run(limit=40.0)
+    assert bench.authority() is H
 
 
 # retries

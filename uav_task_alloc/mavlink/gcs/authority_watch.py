@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.gcs.authority import (
 from uav_task_alloc.mavlink.gcs.authority_recorder import AuthorityRecorder
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.bridge_restart import BridgeRestart
+from uav_task_alloc.mavlink.gcs.climb_check import ClimbCheck
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass
 from uav_task_alloc.mavlink.gcs.hand_over import HandOver
 from uav_task_alloc.mavlink.gcs.link_loss import LinkLoss
@@ -64,6 +65,7 @@ class AuthorityWatch:
         self._arming = ArmingAndLanding(state, evidence, policy)
         self._hand_over = HandOver(state, evidence, policy)
         self._grant = TakeoffGrant(state, policy)
+        self._climb = ClimbCheck(state, evidence)
         self._recorder = AuthorityRecorder(state, evidence, record, save)
 
     @property
@@ -140,6 +142,7 @@ class AuthorityWatch:
         self._modes.resolve(now)
         self._hand_over.step(now)
         self._arming.step(now)
+        self._climb.step(now)
         self._grant.step(now)
         foreign = self._evidence.foreign() and self._policy().when_foreign == 'yield'
         check_foreign(self._state, foreign, now)
@@ -175,6 +178,7 @@ class AuthorityWatch:
         mode = state.profile.commanded_mode(message)
         if mode is not None:
             sent.climb = None
+            self._climb.end()
             sent.acks.command_sent(message.command, mode, now)
             sent.add_mode(mode, now)
             if state.descending and not state.is_return(mode):
@@ -184,6 +188,7 @@ class AuthorityWatch:
             sent.add_arming(message.param1 == 1.0, now)
         elif message.command == d.MAV_CMD_NAV_TAKEOFF:
             state.descending = False
+            self._climb.begin(self._policy().cruise_altitude)
             takeoff_mode = state.profile.takeoff_mode
             if takeoff_mode is not None:
                 sent.acks.command_sent(message.command, takeoff_mode, now)

@@ -8,11 +8,11 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityState, Suspension
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
+from uav_task_alloc.mavlink.gcs.climb_check import CLIMBED
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED
 
-_CLIMBED = 0.9  # of the commanded height: the take-off ended normally
 _HEARTBEAT_DELAY = 1.5  # [s] on the way, as a rule
 _CLOCK_DELAY = 0.5  # [s] of a message with the clock, as a rule
 _CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
@@ -86,7 +86,7 @@ class ModeChanges:
         state, climb = self._state, self._state.sent.climb
         return (climb is not None and entered == state.profile.takeoff_mode
                 and state.class_of(mode) is ModeClass.HOLD
-                and state.telemetry.height >= _CLIMBED * climb)
+                and state.telemetry.height >= CLIMBED * climb)
 
     def _changed(self, before: int, mode: int, now: float) -> None:
         state = self._state
@@ -172,7 +172,7 @@ class ModeChanges:
         state, telemetry = self._state, self._state.telemetry
 
         def climbed(t: float) -> bool:
-            return telemetry.height >= _CLIMBED * climb
+            return telemetry.height >= CLIMBED * climb
 
         state.sent.climb = None
         if climbed(now):
