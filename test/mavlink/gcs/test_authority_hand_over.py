@@ -234,3 +234,31 @@ def test_commands_sent_before_a_hand_over_explain_no_mode_after_it(kind):
     assert bench.reaches(L, 3.0)
     assert bench.onboard().state is MissionState.VERIFIED
     assert sends_no_command(bench, 20.0)
+
+
+@BOTH
+@pytest.mark.parametrize('acks', [0, 1])
+@pytest.mark.parametrize('over', [False, True])
+def test_a_failsafe_back_to_the_mode_before_our_hold_that_no_heartbeat_showed_is_a_loss(
+        kind, acks, over):
+    bench = flying(kind)
+    vehicle = bench.vehicles[1]
+    vehicle.rc_mode(MODES[kind].rtl)
+    assert bench.reaches(L, 3.0)
+    bench.assign(task_list('XYZ', 2))  # to be uploaded while it holds
+    bench.run(limit=3.0)
+    bench.line.tampers += [drop({'COMMAND_ACK'}, acks, 'down'), drop({'MISSION_COUNT'}, 1 << 30),
+                           drop({'HEARTBEAT'}, 1 << 30, 'down')]
+    before = len(bench.line.sent('COMMAND_ACK', 'down'))
+    assert bench.hand_over() == ''
+    assert bench.run(lambda: len(bench.line.sent('COMMAND_ACK', 'down')) > before + acks, 2.5)
+    assert vehicle.flight.custom_mode == MODES[kind].hold
+    bench.run(limit=0.4)
+    vehicle.failsafe('radio', MODES[kind].rtl)
+    bench.line.tampers.clear()
+    bench.run(limit=2.0)
+    if over:
+        vehicle.failsafe_over()
+    assert bench.reaches(L, 6.0)
+    vehicle.failsafe_over()
+    assert sends_no_command(bench)

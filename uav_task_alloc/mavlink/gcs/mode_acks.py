@@ -8,11 +8,15 @@ _ACK_TIMEOUT = 12.0  # [s] after which a command without a COMMAND_ACK counts as
 
 
 class ModeAcks:
-    """Counts COMMAND_ACKs of mode commands; while one is missing no mode is concluded."""
+    """Counts COMMAND_ACKs of mode commands.
+
+    While that of a command for another mode is missing no mode is concluded; a repetition of the
+    same command changes nothing.
+    """
 
     def __init__(self) -> None:
-        self._entered: int | None = None  # custom_mode: accepted, and no other command pending
-        self._frame = 0  # number of the frame of that COMMAND_ACK
+        self._entered: int | None = None  # custom_mode: accepted, and no other mode pending
+        self._frame = 0  # number of the frame of the first such COMMAND_ACK
         # MAV_CMDs sent and not acknowledged, with the custom mode that each sets
         self._pending: list[tuple[int, int]] = []
         self._mixed = False  # different modes were pending at once: a COMMAND_ACK names none
@@ -38,11 +42,12 @@ class ModeAcks:
         if mode is None or result == d.MAV_RESULT_IN_PROGRESS:
             return
         self._pending.remove((command, mode))
-        if self._pending:
+        if self._pending and self._mixed:
             return
         accepted = result == d.MAV_RESULT_ACCEPTED and not self._mixed
-        self._entered = mode if accepted else None
-        self._mixed, self._frame = False, frame
+        if accepted:
+            self._frame = min(frame, self._frame) if self._entered == mode else frame
+        self._entered, self._mixed = mode if accepted else None, False
 
     def mode_entered_by(self, frame: int) -> int | None:
         """The mode that our command had set before this frame was sent; None: not known."""
