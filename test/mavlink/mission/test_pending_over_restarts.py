@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A task that was passed, and still to be judged, when its bridge or its mission was replaced."""
 import pytest
-from authority_bench import ARDUPILOT, MODES, L, flying
+from authority_bench import ARDUPILOT, BOTH, MODES, L, flying
 from evidence_bench import Flight
-from findings_bench import distance, drop_messages, flown_once_each
+from findings_bench import distance, drop_messages, flown_once_each, listed
 from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -88,3 +88,23 @@ def test_a_task_flown_for_a_pilot_before_a_restarted_bridge_has_read_the_mission
     bench.run(limit=1.5)
     assert bench.completed() == ([] if skipped else ['A'])
     flown_once_each(bench, 'ABC')
+
+
+@BOTH
+def test_what_was_passed_before_the_mission_was_read_is_of_no_mission_that_replaced_it(kind):
+    bench = flying(kind, 'ABCD')
+    assert bench.run(lambda: distance(bench, AT_A) < 60.0, 60.0)
+    bench.kill_and_restart(0.0)
+    for message in ('GLOBAL_POSITION_INT', 'MISSION_COUNT'):
+        drop_messages(bench, 'down', message, lambda m: True)
+    bench.assign(task_list('ABCD', 2))
+    assert bench.run(lambda: places(bench) == ['A', 'B'], 60.0)
+    bench.run(limit=2.0)
+    bench.line.tampers.clear()
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 20.0)
+    bench.assign(listed(3, P=(10.0, 97.0), Q=(90.0, 97.0), D=(300.0, 100.0)))
+    assert bench.run(lambda: bench.onboard().revision == 3, 30.0)
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=20.0)
+    assert bench.onboard().held
+    assert bench.completed() == ['A', 'B']

@@ -94,7 +94,7 @@ class Resume:
         _, recorded, arrived = self.recorded
         self._passed_recorded = arrived and recorded is not None and any(
             each.seq > recorded for each in self._unread.currents)
-        self._unread.restarted()
+        self._unread.restarted(self.located)
         self.passed = () if self.located else self.passed
         self.reset()
         self._rebooted = True

@@ -128,9 +128,16 @@ class UnreadReports:
             if reached.place is None and now - reached.at < _LATE_PLACE:
                 reached.place_later(self._telemetry.position, self._telemetry.speed, now)
 
-    def restarted(self) -> None:
-        """Keep what was received before a restart of the vehicle, with the positions of then."""
-        if self.currents:
+    def restarted(self, located: bool) -> None:
+        """Keep what was received before a restart of the vehicle, with the positions of then.
+
+        Args:
+            located: whether the vehicle is located, so that all is judged; the mission may have
+                been replaced since.
+        """
+        if located:
+            self._before = None
+        elif self.currents:
             self._before = self.currents, deepcopy(self._positions)
             self.currents = []
 
