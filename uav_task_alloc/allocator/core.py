@@ -20,6 +20,7 @@ from uav_task_alloc.allocator.records import (
     SavedState,
     UavList,
 )
+from uav_task_alloc.allocator.replanning.battery_changes import BatteryChanges
 from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
 from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
@@ -85,6 +86,7 @@ class Allocator:
         self.separation = SeparationWatch(self.world)
         self.batteries = BatteryWatch(self.world)
         self.waiting = WaitingPlaces(self.world)
+        self._changes = BatteryChanges(self.world, self.waiting)
         self._best = Plan({each.uav: each.task_ids for each in saved.lists}, reversed=frozenset(
             stop.task.id for each in saved.lists for stop in each.stops if stop.reversed))
         self._learned = saved.learned
@@ -117,6 +119,7 @@ class Allocator:
         world.tick(now)
         self.batteries.tick(now, stamp)
         self._end_orders(stamp)
+        self._changes.end(now, stamp)
         world.publish(world.shortened_lists(stamp), stamp)
         world.publish(world.lists_to_resend(stamp), stamp, resend=True)
         if self._restarted:  # the plan of the previous run is published before any other
@@ -136,6 +139,7 @@ class Allocator:
         """Send idle UAVs to waiting places, not while a plan may give them tasks."""
         world, lists = self.world, self.waiting.ended(now)
         if not (self.schedule.busy or self.schedule.triggers):
+            self._changes.send(now, stamp)
             lists = {**self.waiting.chosen(now, stamp), **lists}
         published = world.publish(lists, stamp)
         if published:

@@ -295,12 +295,13 @@ def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], 
 
 
 def _build_empty(world: World, built: BuiltLists, uav_id: str) -> None:
-    """Build an empty list: with a low battery or by order it returns home, else its end is kept.
+    """Build an empty list: its end is kept, without a safe path home it ends with HOLD.
 
-    Without a safe path home it ends with HOLD.
+    With a low battery, for another one, or by order it returns home.
     """
     record, published = world.uav_record(uav_id), world.list_of(uav_id)
-    if record is not None and (record.low or world.orders.returns(uav_id)):
+    if record is not None and (record.low or record.awaits_battery
+                               or world.orders.returns(uav_id)):
         _build(world, built, uav_id, (), True, {})
         return
     empty = replace(published, stops=(), distance=0.0)

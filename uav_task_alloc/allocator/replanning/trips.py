@@ -80,7 +80,7 @@ def waiting_uavs(world: World, stamp: float) -> dict[str, Uav]:
     found = {}
     for uav_id, record in world.uav_records().items():
         report = record.report
-        if not (record.low and report.turnaround and report.full_range
+        if not ((record.low or record.awaits_battery) and report.turnaround and report.full_range
                 and uav_id not in world.fleet.switched_off and not record.blocked_on_ground
                 and world.orders.of_uav(uav_id) is None):
             continue

@@ -21,7 +21,11 @@ from uav_task_alloc.model import Point
 from uav_task_alloc.params import BridgeParams
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from uav_task_alloc.allocator.replanning.waiting_choice import WaitingChoice
+    from uav_task_alloc.anticipation.intensity import Cells
 
 _CHECK = 1.0  # [s] between two checks of the places in force
 _REVIEW, _LEAST_REVIEW = 30.0, 5.0  # [s] between two choices without an event, and with one
@@ -58,6 +62,8 @@ class WaitingPlaces:
     def texts(self) -> dict[str, str]:
         """Return where UAVs wait for tasks, and why others were not sent, by id."""
         found = dict(self._stays) if self.on else {}
+        found.update(dict.fromkeys(self._world.fleet.awaiting_battery(),
+                                   'gets another battery at its home'))
         for uav_id, each in sorted(self._world.lists_in_force().items()):
             if each.waiting_place is not None:
                 x, y, z = each.waiting_place
@@ -82,6 +88,8 @@ class WaitingPlaces:
             return 'no waiting places are wanted'
         if record is None or not self._world.kernels_ready:
             return ''  # after a restart: it has not reported yet
+        if record.awaits_battery:
+            return ''  # the next plan sends it home
         why = self._why_not_idle(each.uav, record)
         if why or way_to_place_is_clear(self._world, each):
             return why
@@ -98,13 +106,38 @@ class WaitingPlaces:
             return f'mode {report.mode or "unknown"}'
         if record.inside_zone or uav_id in world.zone_checks.stranded:
             return 'a zone'
-        hold = world.orders.holds.get(uav_id)
-        if (hold is not None and hold.hold) or any(
-                order.uav == uav_id and order.kind is not OrderKind.FORBID
-                for order in world.orders.in_force.values()):
+        if self.is_ordered(uav_id):
             return 'an order'
         each = world.list_of(uav_id)
         return 'it has tasks' if each.stops or each.returns or report.active_task else ''
+
+    def is_ordered(self, uav_id: str) -> bool:
+        """Return whether an operator holds a UAV, or has given it an order.
+
+        Args:
+            uav_id: of any UAV.
+        """
+        orders = self._world.orders
+        hold = orders.holds.get(uav_id)
+        return (hold is not None and hold.hold) or any(
+            order.uav == uav_id and order.kind is not OrderKind.FORBID
+            for order in orders.in_force.values())
+
+    def idle(self) -> list[str]:
+        """Return the UAVs in flight without tasks that may be sent elsewhere."""
+        return [uav_id for uav_id, record in sorted(self._world.uav_records().items())
+                if not self._why_not_idle(uav_id, record)]
+
+    def demand(self, stamp: float) -> tuple[Cells, NDArray[np.float64]] | None:
+        """Return the area of work, and the probability of the next task in each of its cells.
+
+        Times the value of a task there; None while no area is known.
+        """
+        world, learnt = self._world, self._begun().demand
+        learnt.follow(world.announced.seen, world.params)
+        if learnt.demand is None:
+            return None
+        return learnt.demand.cells, learnt.weight(world.params.anticipate == 'learnt', stamp)
 
     def chosen(self, now: float, stamp: float) -> dict[str, UavList]:
         """Return lists of idle UAVs with other places, where it is time to choose."""
@@ -112,8 +145,7 @@ class WaitingPlaces:
         past = now - self._chosen_at
         if past < _LEAST_REVIEW or not self.on or world.restart_hold or not world.kernels_ready:
             return {}
-        idle = [uav_id for uav_id, record in sorted(world.uav_records().items())
-                if not self._why_not_idle(uav_id, record)]
+        idle = self.idle()
         event = (tuple(idle), world.announced.seen.version, world.plan_revision, world.paths(),
                  world.params.anticipate)
         if past < _REVIEW and event == self._event:
@@ -168,11 +200,22 @@ class WaitingPlaces:
         wanted = max(record.report.position[2], record.home[2] + above)
         return min(max(wanted, params.altitude_min), params.altitude_max)
 
-    def _reach(self, uav_id: str) -> tuple[float, float]:
-        """The metres of way that a battery allows, and the speed [m/s]."""
+    def metres(self, uav_id: str) -> float:
+        """Return what an idle UAV may fly before its battery is down to the reserve.
+
+        Args:
+            uav_id: of a known UAV.
+
+        Returns:
+            [m]; way there and home, and waiting, come out of it.
+        """
         uav = self._world.uav(uav_id)
         seconds = self._world.flights.spendable(uav, self._height(uav_id)).endurance
-        return _SHARE * min(uav.range, seconds * uav.cruise_speed), uav.cruise_speed
+        return min(uav.range, seconds * uav.cruise_speed)
+
+    def _reach(self, uav_id: str) -> tuple[float, float]:
+        """The metres of way that a battery allows, and the speed [m/s]."""
+        return _SHARE * self.metres(uav_id), self._world.uav(uav_id).cruise_speed
 
     def _present(self, idle: list[str]) -> dict[str, tuple[Point, Point]]:
         """Where each idle UAV is, and where it waits or is sent to."""

@@ -30,6 +30,9 @@ class UavRecord:
     battery: float | None = None  # [0..1] last reported
     low: bool = False  # the battery was below the reserve and is not recharged
     turned: bool = False  # its battery required the way home; until it is on the ground
+    # [0..1] charge from which on its battery was changed, for which it was sent home; None: it
+    # was not sent, or has it
+    change_from: float | None = None
     jumped: float = -math.inf  # [s] steady clock: the position last jumped
 
     @property
@@ -40,7 +43,12 @@ class UavRecord:
     @property
     def ready(self) -> bool:
         """Whether it reports, has battery, and is available for tasks."""
-        return self.report.available and not self.silent and not self.low
+        return self.report.available and not (self.silent or self.low or self.awaits_battery)
+
+    @property
+    def awaits_battery(self) -> bool:
+        """Whether it was sent home for another battery, and does not have it yet."""
+        return self.change_from is not None
 
     @property
     def usable(self) -> bool:
@@ -93,7 +101,9 @@ class Fleet:
         if before:
             self.records[uav_id] = replace(
                 self.records[uav_id], zone=before.zone, home_zone=before.home_zone,
-                blocked_on_ground=before.blocked_on_ground, jumped=before.jumped)
+                blocked_on_ground=before.blocked_on_ground, jumped=before.jumped,
+                change_from=None if battery is not None and before.change_from is not None
+                and battery >= before.change_from else before.change_from)
         return before
 
     def forget(self, uav_id: str) -> None:
@@ -114,6 +124,21 @@ class Fleet:
     def turn(self, uav_id: str) -> None:
         """Send a UAV in flight home: its battery lasts for that, and for the reserve."""
         self.records[uav_id] = replace(self.records[uav_id], low=True, turned=True)
+
+    def send_for_battery(self, uav_id: str) -> None:
+        """Send a UAV in flight home for another battery; it gets no tasks until it has it."""
+        record = self.records[uav_id]
+        self.records[uav_id] = replace(
+            record, change_from=min(1.0, (record.battery or 0.0) + _RECHARGED))
+
+    def awaiting_battery(self) -> dict[str, UavRecord]:
+        """Return the UAVs that were sent home for another battery, and do not have it yet."""
+        return {uav_id: record for uav_id, record in self.records.items()
+                if record.awaits_battery}
+
+    def end_change(self, uav_id: str) -> None:
+        """Let a UAV have tasks with the battery that it has."""
+        self.records[uav_id] = replace(self.records[uav_id], change_from=None)
 
     def set_jumped(self, uav_id: str, now: float) -> None:
         """Record that the position jumped."""
@@ -144,6 +169,8 @@ class Fleet:
             return f'{uav_id} has the order to {order.kind.value} ({order.name})'
         if record.low:
             return f'{uav_id} is low on battery'
+        if record.awaits_battery:
+            return f'{uav_id} goes home for another battery'
         return '' if self.usable(uav_id) else (
             record.blocked_on_ground or f'{uav_id} is not available')
 
@@ -248,6 +275,8 @@ def replan_reasons(before: UavRecord | None, after: UavRecord) -> list[str]:
         reasons += ['available' if report.available else 'not available']
     elif before.report.capabilities != report.capabilities:
         reasons += ['has other capabilities']
+    if before is not None and before.awaits_battery and not after.awaits_battery:
+        reasons += ['has another battery']
     if after.low != (before is not None and before.low):
         reasons += [f'battery {100.0 * (after.battery or 0.0):.0f} %: ' + (
             'below the reserve, it returns home' if after.low else 'above the reserve again')]
