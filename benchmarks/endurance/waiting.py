@@ -5,8 +5,9 @@ Run: `python benchmarks/endurance/waiting.py --runs 20 --json`. Allocator, solve
 separation are the real ones, only their clock is virtual; a solve counts CPU time. The UAVs fly
 straight from point to point, hold where the separation says so, use their battery in the air,
 return at the last moment, and get another one at their base. Tasks arrive around three hot spots;
-both runs of a pair have the same. The last line is one JSON object; the status is 1 where a task
-was lost.
+both runs of a pair have the same. With `--against changes` idle UAVs of the other run go
+home for batteries, too, but wait where they are. The last line is one JSON object; the status is 1
+where a task was lost.
 """
 from __future__ import annotations
 
@@ -29,12 +30,14 @@ from uav_task_alloc.allocator import Allocator
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
+    FleetOutlook,
     TaskEvent,
     TaskEventKind,
     UavList,
     UavReport,
 )
 from uav_task_alloc.allocator.replanning import planning
+from uav_task_alloc.allocator.replanning.waiting_places import WaitingPlaces
 from uav_task_alloc.model import Point, Task
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.monitor import SeparationHold
@@ -141,6 +144,17 @@ class Flight:
         return self.passed >= len(line)
 
 
+class NoPlaces(WaitingPlaces):
+    """Sends no UAV to a place, and no plan counts where the next tasks are expected."""
+
+    def chosen(self, now: float, stamp: float) -> dict[str, UavList]:
+        """No list."""
+        return {}
+
+    def outlook(self, stamp: float) -> FleetOutlook | None:
+        """None."""
+
+
 class Run:
     """A fleet, its allocator and the tasks of a seed; `figures` are the result."""
 
@@ -148,12 +162,15 @@ class Run:
         self.args, rng = args, np.random.default_rng(seed)
         self.params = AllocatorParams(
             route_end='hold', objective='response', locked_tasks=args.locked,
-            anticipate=anticipate, anticipate_area=(0.0, 0.0, SIDE, SIDE), trips=1,
+            anticipate='learnt' if anticipate == 'changes' else anticipate,
+            anticipate_area=(0.0, 0.0, SIDE, SIDE), trips=1,
             separation__horizontal=args.separation, background_budget=0.0,
             solve_budget=BUDGET,
             default_climb_speed=CLIMB)
         self.persistence = Persistence(folder, print)
         self.core = Allocator(self.params, 0.0)
+        if anticipate == 'changes':
+            self.core.waiting = NoPlaces(self.core.world)
         self.core.set_kernels_ready()
         self.world = self.core.world
         self.fleet = {f'uav_{k}': Flight(f'uav_{k}', (
@@ -277,11 +294,13 @@ def main(log: Callable[[str], object] = print) -> int:
     parser.add_argument('--separation', type=float, default=30.0, help='[m]; 0: off')
     parser.add_argument('--step', type=float, default=1.0, help='[s] of the simulation')
     parser.add_argument('--anticipate', choices=('even', 'learnt'), default='learnt')
+    parser.add_argument('--against', choices=('off', 'changes'), default='off')
     parser.add_argument('--json', action='store_true', help='the last line alone')
     args = parser.parse_args()
     began, pairs = time.process_time(), []
     for k in range(args.runs):
-        pairs.append((fly(args, args.seed + k, 'off'), fly(args, args.seed + k, args.anticipate)))
+        pairs.append((fly(args, args.seed + k, args.against),
+                      fly(args, args.seed + k, args.anticipate)))
         if not args.json:
             log(f'seed {args.seed + k}: {json.dumps(pairs[-1])}')
     figures = {**summary(pairs), 'cpu_s': round(time.process_time() - began, 1)}
