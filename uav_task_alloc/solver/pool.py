@@ -47,7 +47,7 @@ def _route_key(a: Arrays, r: Routes, pool: Pool, u: int) -> Any:
 
 
 @inline_kernel
-def _slot(pool: Pool, key: Any) -> int:
+def slot_of_key(pool: Pool, key: Any) -> int:
     """Index in the hash table where that key is, or would be. O(1) on average."""
     at = np.int64(key & _MASK)
     while pool.table[at] >= 0 and pool.key[pool.table[at]] != key:
@@ -58,7 +58,7 @@ def _slot(pool: Pool, key: Any) -> int:
 @inline_kernel
 def column_of(a: Arrays, r: Routes, pool: Pool, u: int) -> int:
     """The column of UAV u's tasks; -1 if it is not in the pool. O(tasks)."""
-    return int(pool.table[_slot(pool, _route_key(a, r, pool, u))])
+    return int(pool.table[slot_of_key(pool, _route_key(a, r, pool, u))])
 
 
 @inline_kernel
@@ -74,7 +74,7 @@ def _cost(a: Arrays, r: Routes, u: int) -> float:
 
 
 @inline_kernel
-def _new_column(pool: Pool, tasks: int) -> int:
+def new_column(pool: Pool, tasks: int) -> int:
     """A new column for so many tasks; -1 if the pool is full. O(1)."""
     e = pool.size[0]
     if e == pool.uav.size or pool.first[e] + tasks > pool.stops.size:
@@ -91,10 +91,10 @@ def collect(a: Arrays, r: Routes, pool: Pool) -> None:
         if r.tasks[u] == 0 or (a.hard and r.length[u] > a.range_left[u] + TINY):
             continue
         key, cost = _route_key(a, r, pool, u), _cost(a, r, u)
-        slot = _slot(pool, key)
+        slot = slot_of_key(pool, key)
         e = pool.table[slot]
         if e < 0:
-            e = _new_column(pool, r.tasks[u])
+            e = new_column(pool, r.tasks[u])
             if e < 0:
                 pool.size[0] = 0
                 pool.table[:] = -1

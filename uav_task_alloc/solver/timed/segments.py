@@ -146,7 +146,7 @@ def set_sums(a: TimedArrays, r: TimedRoutes, u: int, c: int, value: float) -> No
 
 
 @inline_kernel
-def _is_infeasible(a: TimedArrays, r: TimedRoutes, u: int) -> bool:
+def is_infeasible(a: TimedArrays, r: TimedRoutes, u: int) -> bool:
     """Whether UAV u's route has excess that is not allowed. O(1)."""
     excess = max(r.route[u, at.WARP], r.route[u, at.LOAD_EXCESS])
     if a.weight[at.BY_EXCESS] == math.inf:
@@ -161,7 +161,7 @@ def _update_route(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None
     before: tasks of the route before the change.
     """
     end, tasks = a.ends + u, r.route[u, at.TASKS]
-    infeasible = _is_infeasible(a, r, u)
+    infeasible = is_infeasible(a, r, u)
     set_sums(a, r, u, at.WARP, r.row[end, at.WARP_BEFORE])
     excess = loads = ranges = 0.0
     slot, i = u, u
@@ -181,7 +181,7 @@ def _update_route(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None
     set_sums(a, r, u, at.LOAD_EXCESS, loads)
     set_sums(a, r, u, at.RANGE_EXCESS, ranges)
     set_sums(a, r, u, at.ENDURANCE_EXCESS, excess * a.begin[u, at.CRUISE])
-    r.counts[at.INFEASIBLE] += int(_is_infeasible(a, r, u)) - int(infeasible)
+    r.counts[at.INFEASIBLE] += int(is_infeasible(a, r, u)) - int(infeasible)
     if a.timed_cost:
         set_sums(a, r, u, at.TIME_COST, _cost_of_time(a, r, u))
         r.route[u, at.END] = (
