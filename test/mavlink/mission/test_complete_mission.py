@@ -71,14 +71,14 @@ def test_a_list_waits_for_the_end_of_a_set_current_that_a_link_delays(kind, dela
 @ARDUPILOT
 def test_a_mission_reported_once_as_not_started_flies_on(kind):
     bench = flying(kind, 'ABC')
-    told = []
+    changed = []
 
     def once(direction, m, now):
-        if m.get_type() == 'MISSION_CURRENT' and not told:
-            told.append(m)
+        if m.get_type() == 'MISSION_CURRENT' and not changed:
+            changed.append(m)
             m.mission_state = d.MISSION_STATE_NOT_STARTED
     bench.line.tampers.append(once)
     before = commanded(bench)
     flown_once_each(bench, 'ABC')
-    assert told
+    assert changed
     assert commanded(bench) == before
