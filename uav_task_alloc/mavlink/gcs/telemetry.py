@@ -81,11 +81,10 @@ class Telemetry:
         self.current_at = self._gap_at = -math.inf  # [s] of it; end of the latest gap of _QUIET
         self.reached: int | None = None  # seq on the wire, latest
         self.total: int | None = None  # number of items as the vehicle reports it
-        self.mission_state = 0  # MISSION_STATE
+        self.mission_state = self.plan_id = 0  # MISSION_STATE; PX4's id of the onboard mission
         self._mode_frame = self._in_mission_frame = 0  # numbers; shows the mode, MISSION (CURRENT)
-        self.mission_restarted = self.mission_ended = self.mission_stopped = False  # by reports
-        self._was_stopped = False  # by the last report
-        self.plan_id = 0  # PX4's id of the onboard mission
+        self.mission_restarted = self.mission_ended = False  # by reports
+        self.mission_stopped = self._was_stopped = False
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
         self.restarts, self.booted_at = 0, -math.inf  # how many; [s] the latest, or earlier
