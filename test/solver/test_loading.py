@@ -61,6 +61,35 @@ def test_the_reason_of_a_task_that_nobody_can_reach_in_time_finds_all_kernels_lo
     assert done.stdout == 'True\nlate:\n'
 
 
+MANY = LOADED + """
+load_timed_kernels(large=True)
+before = loaded()
+tasks = [Task(f't{i}', (1.0 + i % 20, 1.0 + i // 20, 0.0), latest=99.0) for i in range(200)]
+uavs = [Uav(f'u{i}', (0.0, 0.0, 0.0)) for i in range(30)]
+print(len(plan(uavs, tasks, max_iterations=1000).routes))
+print('late:', *sorted(loaded() - before))
+"""
+
+
+def test_a_search_of_many_tasks_with_time_finds_all_kernels_loaded():
+    done = subprocess.run([sys.executable, '-c', MANY], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout == '30\nlate:\n'
+
+
+FEW = LOADED + """
+tasks = [Task(f't{i}', (1.0 + i, 0.0, 0.0), latest=99.0) for i in range(9)]
+plan([Uav('u', (0.0, 0.0, 0.0))], tasks, max_iterations=1000)
+print(*(each for each in loaded() if '.tails' in each or 'multipliers' in each))
+"""
+
+
+def test_a_search_of_few_tasks_with_time_loads_none_for_many():
+    done = subprocess.run([sys.executable, '-c', FEW], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout == '\n'
+
+
 FOR_PYTHON = """
 from uav_task_alloc.geometry import scene, shortest_path
 from uav_task_alloc.geometry.detour import find_detour

@@ -10,6 +10,7 @@ import numpy as np
 from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.timed import columns as at
+from uav_task_alloc.solver.timed.intensify import Intensifier, is_large
 from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.problem import (
     MAX_UNSERVED_GROWTH,
@@ -46,9 +47,10 @@ class TimedParams:
     skipped: float = 0.0  # probability that a round passes over one of them
     by_value: float = 0.0  # share of rounds that insert about the most valuable tasks first
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
+    intensifies: bool = False  # where there are many tasks, also as an Intensifier does
 
 
-COLD = TimedParams()
+COLD = TimedParams(intensifies=True)
 # where many tasks have to be left out: the choice of tasks, more than their order
 SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
                         short_end_temperature=1.3, restart=0.6,
@@ -88,6 +90,8 @@ class TimedColony:
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
         tasks = arrays.ends - arrays.uavs
         growth = 1.0 if problem.prizes else params.unserved_growth
+        self._intensifier = (Intensifier(problem, self.arrays)
+                             if params.intensifies and is_large(problem) else None)
         self._rises = Rises(np.full(4, math.inf), np.full(4, math.inf), growth,
                             MAX_UNSERVED_GROWTH * arrays.unserved, params.absent,
                             params.skipped, params.by_value,
@@ -110,6 +114,12 @@ class TimedColony:
         np.copyto(self.arrays.price, self._price)
         self._rises = self._rises._replace(least=np.full(4, math.inf), most=np.full(4, math.inf))
         self._params, self._gains = replace(self._params, restart=GIVING_UP), 1
+
+    def _intensify(self, intensifier: Intensifier, spent: float) -> None:
+        """Improve the routes after this share of the budget, apart from rounds of search."""
+        if intensifier.is_due(spent):
+            intensifier.recombine(self.best, self.routes, self._flown / spent)
+        intensifier.improve(self.routes, self._round, spent)
 
     def _temperature(self, spent: float) -> float:
         """Temperature in cost after this share of the budget."""
@@ -149,6 +159,8 @@ class TimedColony:
             if self._begin is not None:
                 self._end_temperature = COLD.short_end_temperature
             set_order(self.arrays, self.routes, (self._begin or self.best).order)
+        if self._intensifier:
+            self._intensify(self._intensifier, spent)
         self._gains += anneal(self.arrays, self.routes, self._round, self.best, self._rises,
                               self._params.ruin, self._temperature(spent),
                               self._temperature(until), rounds, self._rng)

@@ -12,6 +12,7 @@ from uav_task_alloc.kernel_cache import (
     NO_WORK,
     NOTICE,
     TIMED_FIRST_WORK,
+    TIMED_LARGE_WORK,
     TIMED_SEARCH_WORK,
     TIMED_ZONES_WORK,
 )
@@ -28,9 +29,11 @@ from uav_task_alloc.solver.timed.colony import (
     TimedColony,
     TimedParams,
 )
-from uav_task_alloc.solver.timed.problem import TimedProblem, make_timed
+from uav_task_alloc.solver.timed.intensify import Intensifier, may_be_large
+from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes, make_timed
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
+from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import BEST_WORTH, FEW_ABSENT, Incumbent
 from uav_task_alloc.solver.timed.warm import completed, first_plan
 from uav_task_alloc.solver.warm import WarmState
@@ -63,7 +66,8 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     Returns:
         The best plan found, with its times.
     """
-    load_timed_kernels(bool(limits.zones), max_iterations != 0, any(task.path for task in tasks))
+    load_timed_kernels(bool(limits.zones), max_iterations != 0, any(task.path for task in tasks),
+                       warm is None and may_be_large(tasks, rules))
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     known = before.problem
@@ -151,20 +155,24 @@ def _aboard(uavs: Sequence[Uav], tasks: Sequence[Task], locked: Mapping[str, tup
 
 
 @functools.cache
-def load_timed_kernels(zones: bool = False, search: bool = True, paths: bool = False) -> None:
+def load_timed_kernels(zones: bool = False, search: bool = True, paths: bool = False,
+                       large: bool = False) -> None:
     """Load the kernels of problems with time, compile those not on disk yet.
 
     Args:
         zones: whether to load the kernels that find paths around zones, too.
         search: False: only what a plan of no iterations needs.
         paths: those of problems with tasks that have a path, not of others.
+        large: whether to load those that only searches of many tasks need, too.
     """
     first = TIMED_FIRST_WORK.plus(TIMED_ZONES_WORK if zones else NO_WORK)
-    with NOTICE.until_loaded(('timed', zones, paths), first, TIMED_SEARCH_WORK, search):
-        _call_kernels(zones, search, paths)
+    large = large and search and not paths
+    rest = TIMED_SEARCH_WORK.plus(TIMED_LARGE_WORK if large else NO_WORK)
+    with NOTICE.until_loaded(('timed', zones, paths), first, rest, search):
+        _call_kernels(zones, search, paths, large)
 
 
-def _call_kernels(zones: bool, search: bool, paths: bool) -> None:
+def _call_kernels(zones: bool, search: bool, paths: bool, large: bool) -> None:
     """Solve a small problem, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0), turnaround=1.0), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0), latest=99.0) for i in range(5))
@@ -178,3 +186,8 @@ def _call_kernels(zones: bool, search: bool, paths: bool) -> None:
     _improve(recorder, 0, WarmState(), None)
     to_timed_plan(problem, recorder, recorder.best, '', False)  # with the reason of the last task
     timed_reasons(problem, [0])
+    if large:
+        search_of_many = Intensifier(problem, problem.arrays)
+        routes, scratch = empty_timed_routes(problem.arrays), empty_round(problem.arrays)
+        search_of_many.improve(routes, scratch, 1.0)
+        search_of_many.recombine(recorder.best, routes, 0.0)

@@ -72,9 +72,13 @@ def completed(problem: TimedProblem, best: Incumbent) -> Incumbent:
     if absent.size and absent.size * tasks.size < MOST_PLACES:
         set_order(a, routes, best.order)
         absent = absent[np.argsort(-a.fixed[absent, at.WORTH], kind='stable')]
-        none = Known(tasks[:0], np.zeros(a.uavs + 1, np.int64), np.zeros(0, np.bool_))
-        fill_routes(a, routes, none, absent, problem.prizes, found, rng_state(0))
+        fill_routes(a, routes, no_routes(a), absent, problem.prizes, found, rng_state(0))
     return found
+
+
+def no_routes(a: TimedArrays) -> Known:
+    """None are known from before."""
+    return Known(np.zeros(0, np.int64), np.zeros(a.uavs + 1, np.int64), np.zeros(0, np.bool_))
 
 
 @kernel
