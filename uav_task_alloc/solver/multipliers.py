@@ -85,8 +85,15 @@ def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
                   work: float) -> tuple[Reduced, float]:
     """Reduced costs for a high lower bound [m], and that bound. O(work).
 
-    flown: (m) column of each UAV or -1; they and unassigned tasks cost `worth` [m]; `work` is how
-    many stops of the pool may be read.
+    Args:
+        a: the problem.
+        pool: the columns.
+        flown: (m) column of each UAV or -1.
+        worth: [m] what they and unassigned tasks cost.
+        work: how many stops of the pool may be read.
+
+    Returns:
+        The reduced costs, and the bound [m].
     """
     costs = Reduced(np.empty(pool.size[0]), np.empty(a.uavs), np.zeros(a.ends))
     bound = _set_reduced_costs(a, pool, flown, worth, work, costs, np.zeros(a.ends),

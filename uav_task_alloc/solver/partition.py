@@ -270,11 +270,19 @@ def _reduced_cost(reduced: Reduced, group: Flags, tasks: Ints, flown: Ints, uav_
 @inner_allocating_kernel
 def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: int,
                 flown: Ints, uav_of: Ints) -> tuple[bool, int]:
-    """Choose the cheapest columns for a group of UAVs and its tasks.
+    """Choose the cheapest columns for a group of UAVs and its tasks. O(limit n).
 
-    group: (m) bool; tasks: int64 task nodes; flown: (m) column of each UAV, -1: none; uav_of:
-    (m + n) UAV by node, -1: unassigned. The last two are changed. Tries about `limit` columns,
-    O(n) each. Returns whether the cost fell, and how many columns were tried.
+    Args:
+        pool: the columns.
+        reduced: their reduced costs.
+        group: (m) bool.
+        tasks: int64 task nodes.
+        limit: columns tried, about.
+        flown: (m) column of each UAV, -1: none; is changed.
+        uav_of: (m + n) UAV by node, -1: unassigned; is changed.
+
+    Returns:
+        Whether the cost fell, and how many columns were tried.
     """
     spare = _reduced_cost(reduced, group, tasks, flown, uav_of) - TINY
     if tasks.size == 0 or spare <= 0.0:

@@ -28,7 +28,14 @@ class Pool(NamedTuple):
 
 
 def empty_pool(a: Arrays) -> Pool:
-    """A pool without columns."""
+    """A pool without columns.
+
+    Args:
+        a: arrays of the problem, for the numbers of UAVs and nodes.
+
+    Returns:
+        The pool.
+    """
     hashes = np.random.default_rng(0).integers(1, 2 ** 64, a.ends, np.uint64)
     return Pool(hashes, np.full(2 * MAX_COLUMNS, -1, np.int64), np.empty(MAX_COLUMNS, np.uint64),
                 np.empty(MAX_COLUMNS, np.int64), np.empty(MAX_COLUMNS),
@@ -48,7 +55,15 @@ def _route_key(a: Arrays, r: Routes, pool: Pool, u: int) -> Any:
 
 @inline_kernel
 def slot_of_key(pool: Pool, key: Any) -> int:
-    """Index in the hash table where that key is, or would be. O(1) on average."""
+    """Index in the hash table where that key is, or would be. O(1) on average.
+
+    Args:
+        pool: the columns.
+        key: hash of a UAV and its tasks.
+
+    Returns:
+        The index.
+    """
     at = np.int64(key & _MASK)
     while pool.table[at] >= 0 and pool.key[pool.table[at]] != key:
         at = (at + 1) % pool.table.size
@@ -75,7 +90,15 @@ def _cost(a: Arrays, r: Routes, u: int) -> float:
 
 @inline_kernel
 def new_column(pool: Pool, tasks: int) -> int:
-    """A new column for so many tasks; -1 if the pool is full. O(1)."""
+    """Add a column without stops. O(1).
+
+    Args:
+        pool: the columns.
+        tasks: number of its stops.
+
+    Returns:
+        The column; -1: the pool is full.
+    """
     e = pool.size[0]
     if e == pool.uav.size or pool.first[e] + tasks > pool.stops.size:
         return -1
