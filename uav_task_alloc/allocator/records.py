@@ -362,6 +362,7 @@ class SavedState:
     lists: list[UavList] = field(default_factory=list)  # last published
     zones: list[ThreatZone] = field(default_factory=list)  # in force
     switched_off: list[str] = field(default_factory=list)  # UAVs, by an operator
+    change_from: dict[str, float] = field(default_factory=dict)  # see `UavRecord`, by UAV
     revision: int = 0  # of the allocation
     learned: Any = None  # body of the row with the learned state
     origin: Origin | None = None  # of all coordinates; None: the journal has none

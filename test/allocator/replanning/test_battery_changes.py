@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """An idle UAV whose battery allows few of the tasks expected goes home for another one."""
+import json
 import math
 
 import numpy as np
 import pytest
 from allocation import AllocatorDriver
 
+from uav_task_alloc.allocator.persistence.restore import restored_state
+from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
@@ -19,8 +22,9 @@ class Service:
     """UAVs between a hot spot and their homes at the origin, and tasks that were withdrawn."""
 
     def __init__(self, *batteries, more=None, **params):
-        self.driver = AllocatorDriver(**{
-            'anticipate': 'learnt', 'anticipate_area': AREA, 'battery_reserve': 0.2, **params})
+        self.params = {'anticipate': 'learnt', 'anticipate_area': AREA, 'battery_reserve': 0.2,
+                       **params}
+        self.driver = AllocatorDriver(**self.params)
         self.batteries = {f'u{k}': battery for k, battery in enumerate(batteries)}
         self.more = dict.fromkeys(self.batteries, more or {})
         self.report()
@@ -54,6 +58,14 @@ class Service:
         self.more[uav_id] = {'position': (0.0, 0.0, 0.0), 'standby': True, 'mode': 'STANDBY',
                              **more}
         self.wait(10.0)
+
+    def restart(self):
+        """Start the allocator again from its journal."""
+        before, rows = self.driver, self.driver.core.rows()
+        stored = [row._replace(body=json.loads(json.dumps(row.body))) for row in rows]
+        self.driver = AllocatorDriver(restored_state(stored), **self.params)
+        self.driver.now = before.now + 2.0
+        self.wait(20.0)
 
     def goes_home(self, uav_id='u0'):
         each, world = self.driver.world.list_of(uav_id), self.driver.world
@@ -117,6 +129,39 @@ def test_it_gets_tasks_again_with_another_battery():
     service.wait(4.0)
     assert service.driver.route('u0') == ('t',)
     assert any('u0 has another battery' in trigger for trigger in service.driver.solves)
+
+
+@pytest.mark.parametrize('landed', [False, True])
+def test_it_waits_for_its_battery_over_a_restart_of_the_allocator(landed):
+    service = Service(0.37)
+    if landed:
+        service.land()
+    service.restart()
+    service.driver.add(('t', 500.0, 0.0))
+    service.wait(4.0)
+    if not landed:
+        assert service.goes_home()
+        service.land()
+    assert service.driver.route('u0') == ()
+    service.batteries['u0'] = 1.0
+    service.wait(4.0)
+    assert service.driver.route('u0') == ('t',)
+    assert [row.body for row in service.driver.core.rows() if row.kind == 'change'] == [None]
+
+
+@pytest.mark.parametrize('body', [None, 'x', -0.1, 1.5, [0.5]])
+def test_a_damaged_row_is_left_out(body):
+    state = restored_state([JournalRow('change', 'u0', body)])
+    assert not state.change_from
+    assert len(state.unreadable) == 1
+
+
+def test_a_uav_that_is_forgotten_leaves_no_row():
+    service = Service(0.37)
+    assert [row.id for row in service.driver.core.rows() if row.kind == 'change'] == ['u0']
+    service.driver.world.forget_uav('u0')
+    assert [row for row in service.driver.core.rows() if row.kind == 'change'] == [
+        JournalRow('change', 'u0', None)]
 
 
 @pytest.mark.parametrize('place', [(0.0, 0.0, 0.0), (900.0, 0.0, 0.0)])

@@ -34,7 +34,7 @@ from uav_task_alloc.zone_codec import JOURNAL_ZONE, decode_zone, encode_zone
 _Value = TypeVar('_Value')
 _ORDER_KINDS = frozenset({'order', 'order_log', 'hold'})
 _KINDS = frozenset({'task', 'work', 'list', 'zones', 'off', 'revision', 'learner', 'origin',
-                    'proposal', 'demand', *_ORDER_KINDS})
+                    'proposal', 'demand', 'change', *_ORDER_KINDS})
 _UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
 _FIRST_FIELDS = frozenset({'id', 'position', 'value', 'service_time', 'required_capabilities',
                            'allowed_uavs', 'acceptance_radius'})  # every journal has them
@@ -66,6 +66,11 @@ def zones_row(zones: Iterable[ThreatZone]) -> JournalRow:
 def off_row(off: Iterable[str]) -> JournalRow:
     """Return the row of the UAVs that an operator switched off."""
     return JournalRow('off', '', sorted(off))
+
+
+def change_row(uav_id: str, change_from: float | None) -> JournalRow:
+    """Return the row of a UAV sent home for another battery; without a body it has it."""
+    return JournalRow('change', uav_id, change_from)
 
 
 def revision_row(revision: int) -> JournalRow:
@@ -124,6 +129,8 @@ def _restore(state: SavedState, row: JournalRow) -> None:
         state.zones = _each(state, 'zone', row.body, decode_zone)
     elif row.kind == 'off':
         state.switched_off = _each(state, 'UAV switched off', row.body, _uav_id)
+    elif row.kind == 'change':
+        state.change_from[_uav_id(row.id)] = check_number('change_from', row.body, 0.0, 1.0)
     elif row.kind == 'revision':
         state.revision = _whole_number('revision', row.body)
     elif row.kind == 'proposal':

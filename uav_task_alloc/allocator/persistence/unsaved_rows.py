@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from uav_task_alloc.allocator.persistence.order_rows import mark_all_orders, order_rows
 from uav_task_alloc.allocator.persistence.restore import (
+    change_row,
     list_row,
     off_row,
     proposal_row,
@@ -38,6 +39,8 @@ def rows(world: World, state: object, most: int | None = None) -> list[JournalRo
                for task_id in sorted(unsaved['task'])[:most]]
     changed += [list_row(lists[uav_id]) if uav_id in lists else JournalRow('list', uav_id, None)
                 for uav_id in sorted(unsaved['list'])]
+    changed += [change_row(uav_id, world.fleet.change_from.get(uav_id))
+                for uav_id in sorted(unsaved['change'])]
     seen = world.announced.seen.blocks
     changed += [JournalRow('demand', number, seen.get(number))
                 for number in sorted(unsaved['demand'])]
@@ -59,6 +62,7 @@ def mark_all(world: World) -> None:
     unsaved = world.unsaved()
     unsaved['task'].update(world.task_records())
     unsaved['list'].update(world.lists_in_force())
+    unsaved['change'].update(world.fleet.change_from)
     unsaved['work'].update(world.works.records)
     unsaved['demand'].update(world.announced.seen.blocks)
     mark_all_orders(world.orders)

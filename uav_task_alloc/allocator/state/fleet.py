@@ -63,6 +63,10 @@ class Fleet:
         off: ids of UAVs that an operator has switched off.
         active: by UAV id the task that it is known to fly.
         orders: of operators; None: there are none.
+        change_from: as restored, see `UavRecord.change_from`, by UAV id.
+
+    Attributes:
+        unsaved: ids of the UAVs whose `change_from` is not on disk.
 
     Arguments of methods:
         uav_id: of a UAV, known or not.
@@ -72,10 +76,12 @@ class Fleet:
     """
 
     def __init__(self, off: Iterable[str] = (), active: Mapping[str, str] | None = None,
-                 orders: Orders | None = None) -> None:
+                 orders: Orders | None = None,
+                 change_from: Mapping[str, float] | None = None) -> None:
         self.records: dict[str, UavRecord] = {}
         self.switched_off = set(off)
         self.orders = orders or Orders()
+        self.change_from, self.unsaved = dict(change_from or {}), set[str]()
         self.active = dict(active or {})  # UAV -> task it is known to be flying
         self.confirmed: set[str] = set()  # held a list of ours, or reported progress of a task
 
@@ -97,13 +103,14 @@ class Fleet:
             self.active[uav_id] = report.active_task
         self.records[uav_id] = UavRecord(
             report, now, report.home or (before.home if before else report.position),
-            battery=battery, low=low or turned, turned=turned)
+            battery=battery, low=low or turned, turned=turned,
+            change_from=self.change_from.get(uav_id))
         if before:
             self.records[uav_id] = replace(
                 self.records[uav_id], zone=before.zone, home_zone=before.home_zone,
-                blocked_on_ground=before.blocked_on_ground, jumped=before.jumped,
-                change_from=None if battery is not None and before.change_from is not None
-                and battery >= before.change_from else before.change_from)
+                blocked_on_ground=before.blocked_on_ground, jumped=before.jumped)
+        if battery is not None and battery >= self.change_from.get(uav_id, math.inf):
+            self.end_change(uav_id)
         return before
 
     def forget(self, uav_id: str) -> None:
@@ -111,6 +118,8 @@ class Fleet:
         self.records.pop(uav_id, None)
         self.active.pop(uav_id, None)
         self.confirmed.discard(uav_id)
+        if self.change_from.pop(uav_id, None) is not None:
+            self.unsaved.add(uav_id)
 
     def mark_silent(self, now: float, timeout: float) -> list[str]:
         """Mark UAVs without a report for `timeout` [s]; returns the newly silent ones."""
@@ -127,9 +136,7 @@ class Fleet:
 
     def send_for_battery(self, uav_id: str) -> None:
         """Send a UAV in flight home for another battery; it gets no tasks until it has it."""
-        record = self.records[uav_id]
-        self.records[uav_id] = replace(
-            record, change_from=min(1.0, (record.battery or 0.0) + _RECHARGED))
+        self._set_change(uav_id, min(1.0, (self.records[uav_id].battery or 0.0) + _RECHARGED))
 
     def awaiting_battery(self) -> dict[str, UavRecord]:
         """Return the UAVs that were sent home for another battery, and do not have it yet."""
@@ -138,7 +145,15 @@ class Fleet:
 
     def end_change(self, uav_id: str) -> None:
         """Let a UAV have tasks with the battery that it has."""
-        self.records[uav_id] = replace(self.records[uav_id], change_from=None)
+        self._set_change(uav_id, None)
+
+    def _set_change(self, uav_id: str, change_from: float | None) -> None:
+        self.records[uav_id] = replace(self.records[uav_id], change_from=change_from)
+        self.unsaved.add(uav_id)
+        if change_from is None:
+            self.change_from.pop(uav_id, None)
+        else:
+            self.change_from[uav_id] = change_from
 
     def set_jumped(self, uav_id: str, now: float) -> None:
         """Record that the position jumped."""

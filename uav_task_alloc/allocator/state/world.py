@@ -101,7 +101,7 @@ class World:
         self.orders, self.proposal = Orders(saved.orders), saved.proposal
         self.fleet = Fleet(saved.switched_off, {
             record.uav: record.task.id for record in saved.tasks
-            if record.state is TaskState.ACTIVE}, self.orders)
+            if record.state is TaskState.ACTIVE}, self.orders, saved.change_from)
         self.lists = PublishedLists(saved.lists, (record.task.id for record in saved.tasks))
         self.flights = Flights(self.fleet, self.lists, lambda: self.params)
         self.ordered = OrderedTasks(self.tasks, self.flights, self.fleet, self.lists, self.paths,
@@ -390,5 +390,5 @@ class World:
     def unsaved(self) -> dict[str, set[str]]:
         """Return what is not on disk: ids of 'task' and 'list' rows, kinds of the rows of ''."""
         return {'task': self.tasks.unsaved, 'work': self.works.unsaved,
-                'list': self.lists.unsaved, '': self._unsaved,
+                'list': self.lists.unsaved, 'change': self.fleet.unsaved, '': self._unsaved,
                 'demand': self.announced.seen.unsaved, **self.orders.unsaved}
