@@ -263,3 +263,22 @@ def test_a_stick_mode_set_on_the_ground_before_a_reboot_is_of_a_pilot(kind, boot
     bench.run(limit=14.0)
     assert status_is(bench, L)
     assert sends_no_command(bench)
+
+
+@BOTH
+def test_a_late_message_of_before_a_reboot_does_not_hide_who_set_a_mode(kind):
+    bench, hidden = on_ground(kind, H), []
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        hidden and direction == 'down' and m.get_type() == 'HEARTBEAT') else None)
+    bench.run(limit=20.0)
+    late = d.MAVLink_system_time_message(0, int(1e3 * bench.now))
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=5.2)  # a heartbeat after the reboot was seen too
+    assert bench.authority() is H
+    hidden.append(True)
+    bench.from_station(set_mode(MODES[kind].land, kind))
+    bench.from_vehicle(late)
+    bench.run(limit=1.0)
+    hidden.clear()
+    assert bench.reaches(L, 6.0)
+    assert sends_no_command(bench)

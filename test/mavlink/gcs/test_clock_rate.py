@@ -79,3 +79,35 @@ def test_a_restart_shows_by_two_clocks_that_went_back(flying):
     assert flying.restarts == 0
     clocked(flying, 3200, 13.2)
     assert flying.restarts == 1
+
+
+@pytest.mark.parametrize('late', [20000, 59500, 61000])
+def test_late_messages_of_before_a_restart_show_no_other_one(flying, late):
+    for k in range(3):
+        clocked(flying, 500 + 200 * k, 6.5 + 0.2 * k)
+    assert flying.restarts == 1
+    clocked(flying, late, 7.0)
+    for k in range(40):
+        clocked(flying, 1100 + 200 * k, 7.1 + 0.2 * k)
+        if k in (3, 18):
+            clocked(flying, late, 7.1 + 0.2 * k)
+    assert flying.restarts == 1
+    assert flying.boot_ms == 8900
+
+
+def test_a_faster_clock_after_a_restart_is_followed():
+    telemetry = Telemetry(PROFILES['px4'], ORIGIN, 0.0)
+    for k in range(60):
+        clocked(telemetry, 2000 * k, 0.2 * k)  # ten times real time
+    for k in range(3):
+        clocked(telemetry, 4000 + 6000 * k, 12.0 + 0.6 * k)
+    assert telemetry.restarts == 1
+    assert telemetry.boot_ms == 16000
+
+
+def test_another_restart_soon_after_one_is_seen(flying):
+    for k in range(60):
+        clocked(flying, 500 + 200 * k, 6.5 + 0.2 * k)
+    for k in range(3):
+        clocked(flying, 300 + 200 * k, 18.5 + 0.2 * k)
+    assert flying.restarts == 2

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.autopilots import OFF_GROUND, ModeFunction, Profile
-from uav_task_alloc.mavlink.gcs.clock_rate import ClockRate
+from uav_task_alloc.mavlink.gcs.boot_clock import BootClock
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
@@ -22,9 +22,6 @@ _ORDERED = 5.0  # [s] in which the numbers of two frames order them
 _REPORTED = 3.0  # [s] until a vehicle without estimator or GPS reports is trusted
 _BATTERY_TIMEOUT = 10.0  # [s] without a report: the battery does not count
 _BATTERY_RISE = 0.03  # [0..1] smallest accepted rise of a battery reading
-_RESTART_STEP = 2000  # [ms] decrease of time_boot_ms that shows a restart, not a late message
-_MAX_DELAY = 6.0  # [s] of a late message
-_CATCH_UP = 1.0  # [s] in which a link delivers what it has buffered in a silence
 _IN_AIR = frozenset({
     d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING})
 _SIMULATED = 2.0  # seconds of its clock in one of this program: a simulator that runs faster
@@ -88,9 +85,8 @@ class Telemetry:
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
         self.restarts, self.booted_at = 0, -math.inf  # how many; [s] the latest, or earlier
-        self.boot_ms = self._older_clocks = 0  # [ms] time_boot_ms; messages in a row before it
-        self._boot_at = self._older_at = now  # [s]; of the first message in a row before it
-        self.clock_rate = ClockRate()
+        self._boot_clock = BootClock(now)
+        self.clock_rate = self._boot_clock.rate
         self.frames = FrameLog()
         self.frame = 0  # frame number of the latest message
         self._newest: dict[str, tuple[int, float]] = {}  # number of a frame and time [s] by type
@@ -110,6 +106,11 @@ class Telemetry:
             'MISSION_CURRENT': self._current, 'MISSION_ITEM_REACHED': self._reached,
             'GPS_RAW_INT': self._gps, 'EKF_STATUS_REPORT': self._estimate,
             'ESTIMATOR_STATUS': self._estimate}
+
+    @property
+    def boot_ms(self) -> int:
+        """The latest time since boot of the vehicle [ms]."""
+        return self._boot_clock.boot_ms
 
     @property
     def off_ground(self) -> bool:
@@ -198,8 +199,10 @@ class Telemetry:
             self._gap_at = now
         self.received_at = now
         boot = getattr(message, 'time_boot_ms', None)
-        if boot is not None:
-            self._clock(boot, now)  # first, as a restart begins other frame numbers
+        if boot is not None:  # first, as a restart begins other frame numbers
+            booted_at = self._boot_clock.receive(boot, now)
+            if booted_at is not None:
+                self._reset(booted_at)
         if skipped := getattr(message, 'skipped', ()):
             self.frames.note_all((seq for system, seq in skipped
                                   if system == message.get_srcSystem()), now)
@@ -213,10 +216,14 @@ class Telemetry:
             handler(message, now)
         return True
 
-    def restart(self, boot_ms: int = 0) -> None:
-        """Reset after a restart, or when another vehicle uses its system id."""
-        self.boot_ms, self._older_clocks = boot_ms, 0
-        self.clock_rate.reset()
+    def restart(self) -> None:
+        """Reset when another vehicle uses its system id."""
+        self._boot_clock.reset()
+        self._reset(self.booted_at)
+
+    def _reset(self, booted_at: float) -> None:
+        """Forget what a restart ends."""
+        self.booted_at = booted_at
         self.restarts += 1
         self.received_ids = set()
         self.received_last.clear()
@@ -242,32 +249,6 @@ class Telemetry:
         self._newest[kind] = self.frame, now
         return True
 
-    def _clock(self, boot_ms: int, now: float) -> None:
-        """Detect a restart: two messages in a row with an older clock, as one may be late.
-
-        If late messages may be as old as that, no message on time may follow for a while.
-        A clock that has only advanced less than the silence shows a restart if it does not
-        catch up: a link may deliver in order what it has buffered.
-        """
-        silence = now - self._boot_at  # a running clock advances by that
-        least = self.boot_ms - _RESTART_STEP + 500.0 * silence
-        if boot_ms >= least:
-            self.boot_ms, self._older_clocks = max(boot_ms, self.boot_ms), 0
-            self._boot_at = now
-            if boot_ms == self.boot_ms:
-                self.clock_rate.add(1e-3 * boot_ms, now)
-            return
-        if self._older_clocks == 0:
-            self._older_at = now
-        self._older_clocks += 1
-        went_back = boot_ms < self.boot_ms - _RESTART_STEP
-        if self._older_clocks >= 2 and (went_back or now - self._older_at >= _CATCH_UP) and (
-                boot_ms < least - 1000.0 * _MAX_DELAY or silence > _MAX_DELAY):
-            self._boot_at = now
-            rate = self.clock_rate.value
-            self.restart(boot_ms)
-            self.booted_at = now - 1e-3 * boot_ms / (1.0 if math.isnan(rate) else rate)
-
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         self.mode = self._profile.mode_function(message.custom_mode)
@@ -276,8 +257,8 @@ class Telemetry:
         if self.mode is ModeFunction.MISSION:
             self._landed_since_mission = False
         if message.system_status == d.MAV_STATE_BOOT and self._started:
-            self.restart()  # its clock is received later
-            self.booted_at = now
+            self._boot_clock.restart(0, now)  # its clock is received later
+            self._reset(now)
         self.status, self.autopilot = message.system_status, message.autopilot
         # PX4 reports UNINIT later as well, when its preflight checks fail
         self._started = self._started or self.status >= d.MAV_STATE_STANDBY
