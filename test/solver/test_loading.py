@@ -4,6 +4,13 @@ import re
 import subprocess
 import sys
 
+
+def run(script):
+    """A process that has run a script."""
+    return subprocess.run([sys.executable, '-c', script], capture_output=True, text=True,
+                          check=True)
+
+
 LOADED = """
 import sys
 
@@ -41,9 +48,7 @@ print('late:', *sorted(loaded() - before))
 
 
 def test_a_first_plan_and_a_tight_world_with_zones_find_all_kernels_loaded():
-    done = subprocess.run([sys.executable, '-c', SCRIPT], capture_output=True, text=True,
-                          check=True)
-    assert done.stdout == 'late:\nlate:\n'
+    assert run(SCRIPT).stdout == 'late:\nlate:\n'
 
 
 LATE = LOADED + """
@@ -56,9 +61,7 @@ print('late:', *sorted(loaded() - before))
 
 
 def test_the_reason_of_a_task_that_nobody_can_reach_in_time_finds_all_kernels_loaded():
-    done = subprocess.run([sys.executable, '-c', LATE], capture_output=True, text=True,
-                          check=True)
-    assert done.stdout == 'True\nlate:\n'
+    assert run(LATE).stdout == 'True\nlate:\n'
 
 
 MANY = LOADED + """
@@ -72,9 +75,7 @@ print('late:', *sorted(loaded() - before))
 
 
 def test_a_search_of_many_tasks_with_time_finds_all_kernels_loaded():
-    done = subprocess.run([sys.executable, '-c', MANY], capture_output=True, text=True,
-                          check=True)
-    assert done.stdout == '30\nlate:\n'
+    assert run(MANY).stdout == '30\nlate:\n'
 
 
 FEW = LOADED + """
@@ -85,9 +86,7 @@ print(*(each for each in loaded() if '.tails' in each or 'multipliers' in each))
 
 
 def test_a_search_of_few_tasks_with_time_loads_none_for_many():
-    done = subprocess.run([sys.executable, '-c', FEW], capture_output=True, text=True,
-                          check=True)
-    assert done.stdout == '\n'
+    assert run(FEW).stdout == '\n'
 
 
 FOR_PYTHON = """
@@ -105,9 +104,7 @@ for kernel in (shortest_path.shortest_path, shortest_path.path_clears, scene.sto
 
 
 def test_kernels_that_search_paths_are_compiled_only_within_those_that_call_them():
-    done = subprocess.run([sys.executable, '-c', FOR_PYTHON], capture_output=True, text=True,
-                          check=True)
-    assert done.stdout.split() == ['True', 'False', 'False', 'False']
+    assert run(FOR_PYTHON).stdout.split() == ['True', 'False', 'False', 'False']
 
 
 NO_ZONES = """
@@ -121,9 +118,7 @@ for kernel in (shortest_path.shortest_path, distances.stored_path, obstacles.con
 
 
 def test_without_zones_no_kernel_that_finds_paths_around_them_is_loaded():
-    done = subprocess.run([sys.executable, '-c', NO_ZONES], capture_output=True, text=True,
-                          check=True)
-    assert done.stdout.split() == ['0', '0', '0']
+    assert run(NO_ZONES).stdout.split() == ['0', '0', '0']
 
 
 NOTICE = """
@@ -150,8 +145,7 @@ STATED = r'compiling kernels \(once, about (\d+) s(?: to a first plan, (\d+) s i
 
 def test_the_notice_states_the_time_of_what_is_loaded():
     for solver, load in (('solve', 'load_kernels'), ('timed.solve', 'load_timed_kernels')):
-        done = subprocess.run([sys.executable, '-c', NOTICE.format(solver=solver, load=load)],
-                              capture_output=True, text=True, check=True)
+        done = run(NOTICE.format(solver=solver, load=load))
         (first, whole), (first_zones, whole_zones), rest = (
             [float(each or 0.0) for each in re.fullmatch(STATED, line).groups()]
             for line in done.stderr.splitlines(keepends=True))
