@@ -41,6 +41,7 @@ class _Visit:
     state: _State
     next_at: float = math.inf  # [s] the next item was reached
     set_at: float = math.inf  # [s] another station has set the current item since
+    own_at: float = math.inf  # [s] a PX4 took off or landed by a mode of its own since
 
 
 class DeliveredEvidence:
@@ -51,10 +52,16 @@ class DeliveredEvidence:
     and a frame sent after them that shows mission mode: without one a pilot may have taken the
     vehicle just before it was there.
     A MISSION_CURRENT sent after another station has set the current item is none: it would be the
-    same if the item had been skipped just before it was reached.
+    same if the item had been skipped just before it was reached. Nor is COMPLETE of a PX4 once it
+    was in Takeoff or Land: these modes report their own end as that of the mission
+    (`Land::on_active` and `Takeoff::on_active` of its navigator).
+
+    Args:
+        px4: the vehicle is a PX4, whose missions are replaced with their current item.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, px4: bool) -> None:
+        self._px4 = px4
         self.known: dict[str, float] = {}  # tasks with evidence, and when [s] it was complete
         self._now = 0.0  # [s] of the tick
         self._held_from = -math.inf  # [s] visits before it need a current item in mission mode
@@ -71,19 +78,19 @@ class DeliveredEvidence:
             flight.body.position, flight.seq if mission else None, tuple(flight.items),
             flight.booted)
         self._states.pop(_tick(now - KEPT), None)
+        if self._px4 and flight.mode in (FlightMode.TAKEOFF, FlightMode.LAND):
+            for visit in self._visits.values():
+                visit.own_at = min(visit.own_at, now)
 
-    def forget(self, atomic: bool) -> None:
+    def forget(self) -> None:
         """Forget what a bridge had still to judge that was killed, and has left no file.
 
         Its successor cannot know either for which mission an ArduPilot is held: the current item
         of a mission that was replaced stays until it flies.
-
-        Args:
-            atomic: its missions are replaced with their current item (PX4).
         """
         self.known = {task: at for task, at in self.known.items() if self._now - at > JUDGED}
         self._positions.clear()
-        if not atomic:
+        if not self._px4:
             self._held_from = self._now
 
     def reached(self, task: str, at: float, seq: int, place: Point, hold: float,
@@ -139,7 +146,8 @@ class DeliveredEvidence:
         if state is not None and state.seq is None and visit.at < self._held_from:
             return False
         past = message.seq > visit.seq or (
-            message.seq == visit.seq and message.mission_state == d.MISSION_STATE_COMPLETE)
+            message.seq == visit.seq and sent < visit.own_at
+            and message.mission_state == d.MISSION_STATE_COMPLETE)
         return past and state is not None and state.booted == visit.state.booted and (
             state.items[:end] == visit.state.items[:end])
 

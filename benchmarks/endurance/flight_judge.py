@@ -76,11 +76,12 @@ class Judge:
         self._taken_by_disarm = self._news = False  # a heartbeat since it was taken was delivered
         self._taken_by_mode = -math.inf  # [s]
         self._killed = False  # known to the bridge, and not handed back by the service since
+        self._handed_at = -math.inf  # [s] by the service: what was sent before shows no later kill
         self._events = 0
         self._forgot = False  # the bridge, until its first heartbeat
         self._set_at = -math.inf  # [s] another station has set the current item
         self._crossed: set[str] = set()  # tasks whose places it crossed at such a moment
-        self._evidence = DeliveredEvidence()
+        self._evidence = DeliveredEvidence(self.family == 'px4')
         self._at = ''  # the task that it has reached, until it leaves: one visit
         self._avoids = False  # its autopilot avoids other traffic
         self._stuck_since = self._moved_at = 0.0
@@ -92,6 +93,8 @@ class Judge:
             return
         self.taken_at = self.known_at = None
         self.stubborn = self._killed = False
+        if by_service:
+            self._handed_at = self.world.now
         self.counts['handed_back'] += 1
 
     def rebooted(self) -> None:
@@ -106,7 +109,7 @@ class Judge:
         On the ground it forgets who took it, and what its predecessor had still to judge.
         """
         self._forgot, self._killed = True, False
-        self._evidence.forget(self.family == 'px4')
+        self._evidence.forget()
 
     def step(self) -> None:
         """Judge one tick of the world."""
@@ -121,7 +124,8 @@ class Judge:
             self._shown_armed |= sent >= self._armed_at and shows_armed(message)
             if message.get_type() == 'HEARTBEAT':
                 self._boot_over |= message.system_status >= d.MAV_STATE_STANDBY
-                self._killed |= message.system_status > d.MAV_STATE_CRITICAL
+                self._killed |= sent > self._handed_at and (
+                    message.system_status > d.MAV_STATE_CRITICAL)
         if self.world.now - self._set_at < PASSED:
             self._crossed.update(name for name, place in self.places.items() if math.dist(
                 place, self.world.vehicle.flight.body.position) < NEAR)

@@ -27,8 +27,8 @@ REACHED_AT = 10.0  # [s]
 class Visit:
     """One vehicle that reaches item 2 at PLACE at REACHED_AT, and flies on."""
 
-    def __init__(self, hold=0.0, ends=False):
-        self.evidence, self.hold, self.ends = DeliveredEvidence(), hold, ends
+    def __init__(self, hold=0.0, ends=False, px4=False):
+        self.evidence, self.hold, self.ends = DeliveredEvidence(px4), hold, ends
         self.flight = SimpleNamespace(body=SimpleNamespace(position=AWAY), seq=2, booted=0.0,
                                       mode=FlightMode.MISSION, items=['home', 'A', 'B', 'C'])
 
@@ -138,21 +138,36 @@ def test_a_bridge_killed_without_a_file_forgets_what_it_had_still_to_judge(kille
     evidence = visit.fly(10.2)
     evidence.delivered(10.1, current(3))
     evidence.add_state(killed, visit.flight)
-    evidence.forget(atomic=False)
+    evidence.forget()
     assert ('B' in evidence.known) is known
 
 
-@pytest.mark.parametrize(('atomic', 'mode', 'known'), [
+@pytest.mark.parametrize(('px4', 'mode', 'known'), [
     (False, FlightMode.HOLD, False), (False, FlightMode.MISSION, True),
     (True, FlightMode.HOLD, True)])
 def test_a_current_item_of_an_ardupilot_that_was_held_for_a_mission_is_no_evidence(
-        atomic, mode, known):
-    visit = Visit()
+        px4, mode, known):
+    visit = Visit(px4=px4)
     evidence = visit.fly(11.0)
-    evidence.forget(atomic)
+    evidence.forget()
     visit.flight.mode = mode
     evidence.add_state(12.0, visit.flight)
     evidence.delivered(12.0, current(3))
+    assert ('B' in evidence.known) is known
+
+
+@pytest.mark.parametrize(('px4', 'mode', 'known'), [
+    (True, FlightMode.LAND, False), (True, FlightMode.TAKEOFF, False),
+    (True, FlightMode.HOLD, True), (False, FlightMode.LAND, True)])
+def test_the_end_of_a_landing_of_a_px4_is_no_evidence_that_its_mission_has_ended(
+        px4, mode, known):
+    visit = Visit(px4=px4)
+    evidence = visit.fly(11.0)
+    visit.flight.mode = mode
+    evidence.add_state(12.0, visit.flight)
+    visit.flight.mode = FlightMode.HOLD
+    evidence.add_state(13.0, visit.flight)
+    evidence.delivered(13.0, current(2, d.MISSION_STATE_COMPLETE))
     assert ('B' in evidence.known) is known
 
 
@@ -171,8 +186,12 @@ def arm_command():
         1, 1, d.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
 
 
-def judged(rows):
-    """The faults of a PX4 on the ground; rows: time, (event, cause, mode)s, frame, command."""
+def judged(rows, hand_over_at=-1.0, late=0.0):
+    """The faults of a PX4 on the ground; rows: time, (event, cause, mode)s, frame, command.
+
+    The operator hands it over by the service at `hand_over_at` [s], and it takes off; frames that
+    come after that were sent `late` [s] before.
+    """
     flight = SimpleNamespace(
         body=SimpleNamespace(position=AWAY, velocity=(0.0, 0.0, 0.0)), custom_mode=0, seq=0,
         booted=0.0, mode=FlightMode.HOLD, items=[], landed=True, track=None, armed=False,
@@ -187,8 +206,12 @@ def judged(rows):
             for name, cause, mode in events]
         for name, _, _ in events:
             flight.armed = {'armed': True, 'disarmed': False}.get(name, flight.armed)
-        world.delivered = [(now, frame)] if frame else []
-        world.arrivals = [now] if frame and frame.get_type() == 'HEARTBEAT' else []
+        if now == hand_over_at:
+            judge.handed_back(by_service=True)
+            flight.landed = False
+        sent_at = now - late * (now > hand_over_at >= 0.0)
+        world.delivered = [(sent_at, frame)] if frame else []
+        world.arrivals = [sent_at] if frame and frame.get_type() == 'HEARTBEAT' else []
         world.sent = [(now, sent)] if sent else []
         judge.step()
     return judge.counts
@@ -253,6 +276,19 @@ def test_what_a_pilot_lets_a_killed_vehicle_fly_again_is_counted_apart(kill, cou
         (4.0, [('item_reached', 'A', None)], None, arm_command())])
     assert counts[counted] == 1
     assert counts['flown_twice'] + counts['flown_again_killed'] == 1
+
+
+@pytest.mark.parametrize(('late', 'overridden'), [(2.0, False), (0.5, True)])
+def test_a_heartbeat_of_before_a_hand_over_by_the_service_shows_no_kill_after_it(late, overridden):
+    killed = heartbeat(False, d.MAV_STATE_FLIGHT_TERMINATION)
+    counts = judged([
+        (1.0, [('armed', OURS, None)], heartbeat(True), None),
+        (2.0, [('kill_switch', 'pilot', None)], killed, None), (3.0, [], None, None),
+        (4.0, [], killed, None), (5.0, [('mode', 'pilot', px4_mode(4, 5))], None, None),
+        (8.0, [('mode', 'pilot', px4_mode(4, 4))], heartbeat(True), None),
+        (9.0, [], None, arm_command())],
+        hand_over_at=3.0, late=late)
+    assert bool(counts['overridden']) is overridden
 
 
 def fly_random(monkeypatch, number, break_bridge):
