@@ -374,6 +374,20 @@ def test_a_last_task_reached_before_a_reboot_and_a_restart_at_once_is_known(x, r
     assert [each.seq for each in taken] == [1] * known
 
 
+@pytest.mark.parametrize(('current', 'known'), [(2, True), (1, False)])
+def test_a_task_reached_without_a_position_just_before_a_reboot_is_known_by_the_current_items(
+        current, known):
+    reports = reports_of((0.0, 0.0, 0.0), repeats=False)
+    reports._telemetry.has_position = False
+    reports.note_reached(1, 1.0, 2)
+    reports.note_current(current, 1.2, 3, located=False)
+    reports.restarted(located=False)
+    reports._telemetry.has_position = True  # where it has fallen down
+    reports.note_current(0, 3.5, 4, located=False)
+    taken = reports.take_reached(items_at(0.0, 100.0, 200.0), 1, 4.0)
+    assert [each.seq for each in taken] == [1] * known
+
+
 def test_the_clock_of_a_reboot_drops_no_positions_that_came_since_the_bridge_was_restarted():
     flight = Flight()
     flight.table.positions.clear()

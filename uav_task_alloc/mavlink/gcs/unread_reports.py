@@ -84,6 +84,7 @@ class UnreadReports:
         self._reached: list[UnreadReached] = []
         # of before a restart of the vehicle, whose clock starts again
         self._before: tuple[list[UnreadCurrent], PositionHistory] | None = None
+        self._earlier: list[UnreadCurrent] = []  # of before it, until each REACHED was judged
 
     def note_current(self, seq: int, now: float, frame: int, located: bool) -> None:
         """Take a MISSION_CURRENT.
@@ -136,10 +137,10 @@ class UnreadReports:
                 been replaced since.
         """
         if located:
-            self._before = None
+            self._before, self._earlier = None, []
         elif self.currents:
             self._before = self.currents, deepcopy(self._positions)
-            self.currents = []
+            self._earlier, self.currents = self.currents, []
 
     def take_reached(self, held: tuple[Item, ...], recorded: int | None,
                      now: float) -> list[UnreadReached]:
@@ -164,6 +165,7 @@ class UnreadReports:
                     self._is_recorded(each, recorded, held)):
                 reached.append(each)
         self._reached.clear()
+        self._earlier = []
         return reached
 
     def passed(self, held: tuple[Item, ...], home: Point | None,
@@ -213,8 +215,9 @@ class UnreadReports:
 
         It shows that without a position, too, as in an EKF failsafe; PX4's repetitions do not.
         """
-        before = [each.seq for each in self.currents if each.frame < reached.frame]
-        after = [each for each in self.currents if each.frame > reached.frame][:1]
+        currents = self._earlier + self.currents
+        before = [each.seq for each in currents if each.frame < reached.frame]
+        after = [each for each in currents if each.frame > reached.frame][:1]
         known = before[-1] if before else recorded
         return not self._repeats and known == reached.seq and any(
             each.flying and each.seq == reached.seq + (not each.complete) for each in after)
