@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as d
-from vehicle_bench import Bench, item, of, reached, waypoint
+from vehicle_bench import ORIGIN, Bench, item, of, reached, waypoint
 
 from uav_task_alloc.sim.config import FlightMode
 from uav_task_alloc.sim.dynamics import metres_between
@@ -98,6 +98,34 @@ def test_return_ends_on_the_ground_at_home(bench):
     bench.until(lambda: not bench.flight.armed)
     assert bench.flight.landed
     assert metres_between(bench.flight.body.position, (0.0, 0.0, 0.0)) < 1.0
+
+
+def landed_state(bench):
+    return bench.request('EXTENDED_SYS_STATE')[0].landed_state
+
+
+def test_the_landed_state_is_that_of_a_takeoff_until_its_height_is_reached(bench):
+    assert landed_state(bench) == d.MAV_LANDED_STATE_ON_GROUND
+    bench.set_mode(FlightMode.GUIDED if bench.own else FlightMode.HOLD)
+    bench.arm()
+    bench.command(d.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0,
+                  30.0 + (0.0 if bench.own else ORIGIN.altitude_amsl))
+    bench.until(lambda: bench.flight.body.position[2] > 25.0)
+    assert landed_state(bench) == d.MAV_LANDED_STATE_TAKEOFF
+    bench.pass_time(10.0)
+    assert landed_state(bench) == d.MAV_LANDED_STATE_IN_AIR
+
+
+def test_the_landed_state_of_a_return_is_a_landing_once_it_goes_down_over_home(bench):
+    bench.fly(waypoint(A))
+    bench.until(lambda: bench.flight.body.position[0] > 90.0)
+    bench.set_mode(FlightMode.RETURN)
+    bench.until(lambda: bench.flight.body.position[0] < 50.0)
+    assert landed_state(bench) == d.MAV_LANDED_STATE_IN_AIR
+    bench.until(lambda: bench.flight.body.position[2] < 10.0)
+    assert landed_state(bench) == d.MAV_LANDED_STATE_LANDING
+    bench.until(lambda: bench.flight.landed)
+    assert landed_state(bench) == d.MAV_LANDED_STATE_ON_GROUND
 
 
 def test_landing_ends_on_the_ground_where_it_is(bench):

@@ -144,14 +144,15 @@ class Track:
         radius: distance at which a point is passed [m].
         hold: time to stay at the last point [s].
         lands: whether it ends on the ground.
+        takes_off: whether it is the climb of a take-off.
     """
 
     def __init__(self, points: Sequence[Point], radius: float, hold: float = 0.0,
-                 lands: bool = False) -> None:
+                 lands: bool = False, takes_off: bool = False) -> None:
         self.points = tuple(points)
         self.radius = radius
         self.hold = hold
-        self.lands = lands
+        self.lands, self.takes_off = lands, takes_off
         self._next = 0
         self._arrived: float | None = None
 
@@ -161,6 +162,11 @@ class Track:
         if self._next < len(self.points):
             return self.points[self._next]
         return self.points[-1] if self.points else None
+
+    @property
+    def descends(self) -> bool:
+        """Whether it goes down to the ground from here on."""
+        return self.lands and self._next >= len(self.points) - 1
 
     def exit_speed(self, position: Point, then: Point | None, acceleration: float) -> float:
         """Speed [m/s] at which the target may be passed.

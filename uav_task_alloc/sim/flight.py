@@ -101,6 +101,21 @@ class VehicleFlight(Navigation):
                 and self.seq < len(self.items) and self.items[self.seq].command == item_.LAND)
 
     @property
+    def landed_state(self) -> int:
+        """MAV_LANDED_STATE.
+
+        ArduCopter: `is_landing` and `is_taking_off` of its mode; PX4: the type of its setpoint.
+        """
+        if self.landed:
+            return int(dialect.MAV_LANDED_STATE_ON_GROUND)
+        if self.mode is FlightMode.LAND or self.lands_by_item or (
+                self.track is not None and self.track.descends):
+            return int(dialect.MAV_LANDED_STATE_LANDING)
+        if self.mode is FlightMode.TAKEOFF or (self.track is not None and self.track.takes_off):
+            return int(dialect.MAV_LANDED_STATE_TAKEOFF)
+        return int(dialect.MAV_LANDED_STATE_IN_AIR)
+
+    @property
     def positioned(self) -> bool:
         """Whether there is a position estimate, without which it does not arm."""
         return self.boot.positioned

@@ -98,9 +98,9 @@ class Navigation:
         return self.rise_to(max(self.body.position[2], target[2]))
 
     def rise_to(self, height: float) -> Track:
-        """The track straight up to `height` [m] ENU."""
+        """The track of a take-off straight up to `height` [m] ENU."""
         x, y, _ = self.body.position
-        return Track(((x, y, height),), _NEAR)
+        return Track(((x, y, height),), _NEAR, takes_off=True)
 
     def radius(self, item: StoredItem) -> float:
         """Acceptance radius of an item [m]."""

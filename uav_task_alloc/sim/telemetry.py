@@ -139,16 +139,7 @@ class TelemetryMessages:
             self.batteries.percent(0), 0, 0, 0, 0, 0, 0)
 
     def extended_sys_state(self) -> Message:
-        flight = self._flight
-        if flight.landed:
-            state = dialect.MAV_LANDED_STATE_ON_GROUND
-        elif flight.mode is FlightMode.TAKEOFF:
-            state = dialect.MAV_LANDED_STATE_TAKEOFF
-        elif flight.mode is FlightMode.LAND or flight.lands_by_item:
-            state = dialect.MAV_LANDED_STATE_LANDING
-        else:
-            state = dialect.MAV_LANDED_STATE_IN_AIR
-        return dialect.MAVLink_extended_sys_state_message(0, state)
+        return dialect.MAVLink_extended_sys_state_message(0, self._flight.landed_state)
 
     def home_position(self) -> Message | None:
         if not self._flight.positioned:
