@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages are requested at their rates, again when missing, a bounded number of times."""
+"""Messages are requested at their rates, again when missing."""
 import pytest
 from flight_bench import FlightBench
 from mission_bench import ORIGIN, OURS
@@ -46,7 +46,7 @@ def without_message(kind, name):
 
 
 @BOTH
-def test_a_missing_message_is_requested_again_and_given_up_in_the_end(kind):
+def test_a_missing_message_that_no_flight_needs_is_given_up_in_the_end(kind):
     bench = without_message(kind, 'BATTERY_STATUS')
     assert len(requested_rates(bench, 'BATTERY_STATUS')) == MAX_REQUESTS
     assert len(requested_rates(bench, 'GLOBAL_POSITION_INT')) == 1
@@ -60,10 +60,11 @@ def test_a_stream_that_stops_is_requested_again(kind):
     bench.line.tampers.append(lambda direction, m, now: [] if (
         m.get_type() == 'EXTENDED_SYS_STATE') else None)
     bench.run(limit=60.0)
-    assert len(requested_rates(bench, 'EXTENDED_SYS_STATE')) == 1 + MAX_REQUESTS
+    asked = len(requested_rates(bench, 'EXTENDED_SYS_STATE'))
+    assert 1 + MAX_REQUESTS < asked <= 1 + MAX_REQUESTS + 5  # slowly in the end
     bench.line.tampers.clear()
     bench.run(limit=30.0)
-    assert len(requested_rates(bench, 'EXTENDED_SYS_STATE')) == 1 + MAX_REQUESTS
+    assert len(requested_rates(bench, 'EXTENDED_SYS_STATE')) <= asked + 1
 
 
 @BOTH
@@ -78,13 +79,15 @@ def test_positions_that_stop_are_requested_again(kind):
 
 
 @BOTH
-def test_positions_that_never_came_are_requested_until_they_come(kind):
-    bench = without_message(kind, 'GLOBAL_POSITION_INT')
-    asked = len(requested_rates(bench, 'GLOBAL_POSITION_INT'))
+@pytest.mark.parametrize('name', [
+    'GLOBAL_POSITION_INT', 'MISSION_CURRENT', 'EXTENDED_SYS_STATE'])
+def test_what_a_flight_needs_and_never_came_is_requested_until_it_comes(kind, name):
+    bench = without_message(kind, name)
+    asked = len(requested_rates(bench, name))
     assert MAX_REQUESTS < asked <= MAX_REQUESTS + 6  # slowly in the end
     bench.line.tampers.clear()
     bench.run(limit=30.0)
-    assert len(requested_rates(bench, 'GLOBAL_POSITION_INT')) <= asked + 1
+    assert len(requested_rates(bench, name)) <= asked + 1
 
 
 @pytest.mark.parametrize('others', [100, 130, 200, 255, 400])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Requests the messages that the bridge needs, all but positions a bounded number of times."""
+"""Requests the messages that the bridge needs: those it flies by until they come."""
 from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -8,10 +8,12 @@ from uav_task_alloc.mavlink.gcs.telemetry import ESTIMATE, RATES, Telemetry
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 
-_POSITION = d.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+# without them no mission is flown, or the end of none known
+_NEEDED = frozenset({d.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, d.MAVLINK_MSG_ID_MISSION_CURRENT,
+                     d.MAVLINK_MSG_ID_EXTENDED_SYS_STATE})
 _PERIOD = 2.0  # [s] between requests
 MAX_REQUESTS = 5
-_SLOW = 10.0  # [s] between later requests of positions, without which no mission is flown
+_SLOW = 10.0  # [s] between later requests of what is needed
 _SILENT = 10.0  # [s] plus four periods without a message that was received before
 _QUIET = 3.0  # [s] without a position: perhaps restarted, which only new rates show
 
@@ -51,7 +53,7 @@ class MessageRates:
             return []
         all_asked = self._requests >= MAX_REQUESTS
         self._due = now + (_SLOW if all_asked else _PERIOD)
-        missing = [number for number in ((_POSITION,) if all_asked else rates)
+        missing = [number for number in (_NEEDED if all_asked else rates)
                    if number in silent or number not in self._telemetry.received_ids]
         if self._requests and not missing:
             return []
