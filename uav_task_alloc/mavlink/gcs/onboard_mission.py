@@ -285,10 +285,10 @@ class OnboardMission:
 
     def restarted(self) -> None:
         """Reset after a restart of the vehicle: transfer lost, mission unknown."""
-        self._reports.end(self.unknown_upload)
+        until = self._reports.end(self.unknown_upload)
         self.upload.reset()
         self._failures.clear()
-        self.progress.invalidate()
+        self.progress.invalidate(until)
         self.mission.reset()
         self._uploading = self._unconfirmed = None
         self.resume.reset()

@@ -68,18 +68,19 @@ class CurrentItem:
         self.reports.begin(start, now)
         self.set_by_other = self.set_back_from = None
 
-    def invalidate(self, now: float) -> None:
+    def invalidate(self, now: float, until: float) -> None:
         """End the epoch, and complete what the positions have shown so far.
 
         Args:
             now: steady time [s].
+            until: vehicle time [s] after which another mission may have been flown.
         """
         for item in self.passed.seen():
             self._tasks.complete(item.task, item.place)
         active, since = self._active_at_end(now), max(self._epoch.since, self._entered_at)
         # after the last frame that shows mission mode a pilot may have taken it
         if active is not None and self._positions.was_at(
-                active, since, self._shown_until, close=0.0):
+                active, since, min(self._shown_until, until), close=0.0):
             self._tasks.credit(active)
         self.reports.clear()
         self.passed.clear()

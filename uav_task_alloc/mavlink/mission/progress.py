@@ -216,10 +216,10 @@ class ProgressTable:
         self._epoch.number += 1
         self._epoch.items = items
 
-    def invalidate(self) -> None:
-        """End the epoch: the mission on board is unknown."""
+    def invalidate(self, until: float = math.inf) -> None:
+        """End the epoch, known until vehicle time `until` [s]: the mission is not known."""
         self.end_before_restart.note_restart(self._stepped_at, self._epochs.series)
-        self._moves.invalidate(self._stepped_at)
+        self._moves.invalidate(self._stepped_at, until)
         self._reached.end()
         self._epochs.clear()
         self._epochs.series.clear()

@@ -79,6 +79,7 @@ class ReportsDuringUpload:
         self._judged: set[tuple[int, int]] = set()  # first and last frame of series credited early
         self.sent_since: float | None = None
         self.sent_frame: int | None = None
+        self._old_frame: int | None = None  # number of the latest since that shows the old one
         self._start = 0  # index of the item at which the new mission begins
         self._passed: list[_Passed] | None = None  # for the mission taken; None: it is read back
 
@@ -90,6 +91,7 @@ class ReportsDuringUpload:
     def note_sent(self, frame: int) -> None:
         """Note that the new mission was sent to its end, and may be on board from now on."""
         self.sent_since, self.sent_frame = self._progress.path.newest, frame
+        self._old_frame = None
         self._progress.coverage.mission_known = False
 
     def add_reached(self, seq: int, now: float, frame: int) -> None:
@@ -151,17 +153,27 @@ class ReportsDuringUpload:
         else:
             self._progress.note_reached(seq, when, proven=proven, frame=frame)
 
-    def end(self, uploaded: MissionDiff | None) -> None:
-        """Credit by the positions, and drop the rest: the vehicle was restarted."""
+    def end(self, uploaded: MissionDiff | None) -> float:
+        """Credit by the positions, and drop the rest: the vehicle was restarted.
+
+        Returns:
+            Vehicle time [s] until which the old mission was on board.
+        """
+        until = math.inf
         if uploaded is not None:
             self._credit_reached(uploaded)
+            if self.sent_since is not None and uploaded.kind is not DiffKind.APPEND:
+                until = self.sent_since if self._old_frame is None else max(
+                    self.sent_since, self._progress.positions.sent_between(self._old_frame)[0])
         self._reached.clear()
         self._currents.clear()
         self._judged.clear()
         self._passed = None
+        return until
 
     def release(self, frame: int) -> None:
         """Credit REACHED sent before a frame that shows the old mission on board."""
+        self._old_frame = frame
         for reached in self._reached:
             if reached.frame < frame:
                 self._progress.note_reached(
