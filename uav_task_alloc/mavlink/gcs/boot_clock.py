@@ -56,9 +56,9 @@ class BootClock:
         Returns:
             When the vehicle booted [s], where this message shows that it was restarted.
         """
-        silence = now - self._at  # a running clock advances by that
-        if self._is_of_before(boot_ms, silence, now):
+        if self.is_of_before(boot_ms, now):
             return None
+        silence = now - self._at  # a running clock advances by that
         least = self.boot_ms - _RESTART_STEP + 500.0 * silence
         if boot_ms >= least:
             self.boot_ms, self._older = max(boot_ms, self.boot_ms), 0
@@ -77,10 +77,15 @@ class BootClock:
             return now - 1e-3 * boot_ms / (1.0 if math.isnan(rate) else rate)
         return None
 
-    def _is_of_before(self, boot_ms: int, silence: float, now: float) -> bool:
+    def is_of_before(self, boot_ms: int, now: float) -> bool:
         """Whether a message is of before the latest restart: no clock advances that fast.
 
         It would make the messages after it look like those after another restart.
+
+        Args:
+            boot_ms: `time_boot_ms` of the message.
+            now: steady time of its reception [s].
         """
         return now - self._restarted_at < _MAX_DELAY and (
-            boot_ms > self.boot_ms + _RESTART_STEP + 1000.0 * self._rate_before * silence)
+            boot_ms > self.boot_ms + _RESTART_STEP
+            + 1000.0 * self._rate_before * (now - self._at))

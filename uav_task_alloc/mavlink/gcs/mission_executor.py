@@ -171,6 +171,8 @@ class MissionExecutor:
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of this vehicle; returns the messages to send."""
+        if self.telemetry.is_of_before_restart(message, now):
+            return []
         mode_before, newest = self.telemetry.mode, self.telemetry.receive(message, now)
         if self.telemetry.restarts != self._restarts:
             self._restarts = self.telemetry.restarts

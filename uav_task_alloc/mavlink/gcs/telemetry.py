@@ -193,6 +193,11 @@ class Telemetry:
         """Take a mode that the vehicle has acknowledged; its heartbeats may be older."""
         self.mode, self._mode_frame = mode, self.frames.newest
 
+    def is_of_before_restart(self, message: Message, now: float) -> bool:
+        """Whether a message was sent before a restart of the vehicle, and comes after it."""
+        boot = getattr(message, 'time_boot_ms', None)
+        return boot is not None and self._boot_clock.is_of_before(boot, now)
+
     def receive(self, message: Message, now: float) -> bool:
         """Process a message of this vehicle; False if a newer one of its type was received."""
         if now - self.received_at > _QUIET:
