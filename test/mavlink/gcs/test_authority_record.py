@@ -61,6 +61,21 @@ def test_without_a_record_airborne_with_another_mission_it_is_lost(kind, mission
 
 
 @BOTH
+@pytest.mark.parametrize('mode', ['stick', 'rtl'])
+def test_without_a_record_airborne_in_a_mode_that_was_set_in_a_cut_it_is_lost(kind, mode):
+    bench = flying(kind)
+    bench.kill_and_restart(1.0, store=False)
+    bench.run(limit=3.0)
+    assert status_is(bench, L, 'airborne in ')
+    bench.line.cut = True
+    bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
+    bench.run(limit=5.0)
+    bench.line.cut = False
+    assert sends_no_command(bench, names='ABC')
+    assert bench.authority() is L
+
+
+@BOTH
 @pytest.mark.parametrize('mode', ['hold', 'stick', 'rtl'])
 def test_without_a_record_airborne_in_another_mode_it_is_lost(kind, mode):
     bench = flying(kind)

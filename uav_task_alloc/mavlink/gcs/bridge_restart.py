@@ -18,6 +18,7 @@ _BRAKING_TIME = 10.0  # [s] from the HOLD command until the vehicle is at rest
 _CLIMB_ERROR = 0.1  # of the height of a take-off, by which its end differs at most
 # vehicle time, and east and north, of the newest position in `AuthorityRecord.seen`
 _TIME, _PLACE = -7, slice(-6, -4)
+_FRESH = 3.0  # [s] since a heartbeat that still shows the present mode
 _DRIFT = 5.0  # [m] from home at most where a take-off ends
 
 
@@ -217,6 +218,10 @@ class BridgeRestart:
                 state.maybe_ours = state.class_of(state.mode) is ModeClass.MISSION
                 state.apply(AuthorityEvent.RESTART_AIRBORNE, now,
                             f'airborne in {state.name_of(state.mode)} when the bridge started')
-        if state.maybe_ours and authority.state is AuthorityState.LOST and self._evidence.ours():
+        if state.class_of(state.mode) is not ModeClass.MISSION:
+            state.maybe_ours = False  # changed in a cut, as by a failsafe
+        if state.maybe_ours and authority.state is AuthorityState.LOST and (
+                now - state.heartbeat_at < _FRESH and not state.failsafe_active(now)
+                and self._evidence.ours()):
             state.maybe_ours = False
             state.apply(AuthorityEvent.RESTART_OURS, now, 'flies our mission')
