@@ -74,7 +74,7 @@ class Judge:
         self._commanded_arm, self._taken_by_arm = -math.inf, False
         self._armed_at, self._shown_armed = -math.inf, False  # [s]; by a delivered frame since
         self._taken_by_disarm = self._news = False  # a heartbeat since it was taken was delivered
-        self._taken_by_mode = -math.inf  # [s]
+        self._taken_by_mode = self._own_mode_at = -math.inf  # [s]; the latest mode by another
         self._killed = False  # known to the bridge, and not handed back by the service since
         self._handed_at = -math.inf  # [s] by the service: what was sent before shows no later kill
         self._events = 0
@@ -166,6 +166,8 @@ class Judge:
         elif event.name == 'kill_switch' or (
                 event.name in ('armed', 'disarmed') and event.cause not in (OURS, 'self')):
             self._armed = True
+            if event.name == 'disarmed':
+                self._forget_unseen_arming()
             if event.name != 'armed' or event.t - self._commanded_arm > SAME:
                 fresh = self.taken_at is None
                 self._take(event.t)
@@ -228,7 +230,15 @@ class Judge:
                 event.cause != 'failsafe' or airborne or self.world.vehicle.flight.armed) and (
                 self._armed or self._boot_over):  # else as if it had been set during its boot
             self._taken_by_mode = event.t if self.taken_at is None else self._taken_by_mode
+            self._own_mode_at = event.t
             self._take(event.t)
+
+    def _forget_unseen_arming(self) -> None:
+        """An arming that no frame has shown is undone: what remains is the mode."""
+        if self.taken_at == self._armed_at and self.known_at is None and not self._shown_armed:
+            self.taken_at, self._taken_by_arm = None, False
+            if self._mode != self._shown:
+                self.taken_at = self._taken_by_mode = self._own_mode_at
 
     def _mode_undone(self) -> None:
         """The mode by which it was taken ended within the tick: what remains is a disarming."""

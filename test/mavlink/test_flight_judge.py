@@ -243,6 +243,15 @@ def test_an_arming_that_the_bridge_commands_as_the_news_arrives_is_of_both(secon
     assert bool(counts['overridden']) is overridden
 
 
+@pytest.mark.parametrize('end', [BY_LAND, BY_LAND[:2]])
+@pytest.mark.parametrize('shown', [None, heartbeat(True)])
+def test_an_arming_by_a_pilot_that_no_frame_has_shown_and_that_is_undone_is_no_news(shown, end):
+    counts = judged([
+        (1.0, [('armed', 'pilot', None)], None, None), (1.5, [], shown, None),
+        (5.0, end, None, None), (8.0, [], heartbeat(False), None), (8.1, [], None, arm_command())])
+    assert bool(counts['overridden']) is (shown is not None or end is not BY_LAND)
+
+
 @pytest.mark.parametrize(('seconds', 'overridden'), [(0.0, False), (0.3, True)])
 def test_a_mode_that_ends_before_a_frame_can_show_it_is_no_news(seconds, overridden):
     counts = judged([
