@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.mavlink.transport.codec import Codec
+from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Task
 
 AT_A, SPEED = (0.0, 100.0, 50.0), 10.0  # [m/s]
@@ -371,6 +372,26 @@ def test_a_last_task_reached_before_a_reboot_and_a_restart_at_once_is_known(x, r
     reports.note_reached(1, 1.2, 2)  # sent before the reboot
     reports.note_current(0, 1.4, 3, located=False)
     taken = reports.take_reached(items_at(0.0, 100.0), recorded, 2.0)
+    assert [each.seq for each in taken] == [1] * known
+
+
+@pytest.mark.parametrize(('first_at', 'lost', 'current', 'known'), [
+    (0.9, False, 2, True),
+    (1.1, False, 2, False),  # may repeat a REACHED of a mission before
+    (0.9, True, 2, False),  # as well: what was lost may have been its repetition
+    (0.9, False, 1, False)])
+def test_the_first_reached_of_a_px4_without_a_position_is_known_by_the_current_items(
+        first_at, lost, current, known):
+    reports = reports_of((0.0, 0.0, 0.0), repeats=True)
+    telemetry = reports._telemetry
+    telemetry.has_position, telemetry.frames = False, FrameLog()
+    for frame in (1, 2, 4, 5) if lost else (1, 2, 3, 4, 5):
+        telemetry.frames.note(frame, 0.4 * frame)
+    reports.note_current(1, first_at, 1, located=False)
+    reports.note_reached(1, 2.0, 4)
+    reports.note_current(current, 2.1, 5, located=False)
+    telemetry.has_position, telemetry.position = True, (105.0, 0.0, 50.0)
+    taken = reports.take_reached(items_at(0.0, 100.0, 200.0), None, 8.0)
     assert [each.seq for each in taken] == [1] * known
 
 

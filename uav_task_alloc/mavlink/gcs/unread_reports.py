@@ -19,6 +19,7 @@ from uav_task_alloc.model import Point
 _MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
 _MAX_REACHED = 32  # REACHED kept until then
 _PLACE_DELAY = 2.0  # [s] after a REACHED in which a position still shows its place
+_REPETITION = 1.05  # [s] after which PX4 has repeated a REACHED
 _LATE_PLACE = 10.0  # [s] the same, where the reports of the current item agree
 
 
@@ -214,12 +215,18 @@ class UnreadReports:
         """Whether it came between reports of its item and of what follows as the current item.
 
         It shows that without a position, too, as in an EKF failsafe; PX4's repetitions do not.
+        The first one is known as that where no frame was lost in the second before it.
         """
         currents = self._earlier + self.currents
         before = [each.seq for each in currents if each.frame < reached.frame]
         after = [each for each in currents if each.frame > reached.frame][:1]
         known = before[-1] if before else recorded
-        return not self._repeats and known == reached.seq and any(
+        if self._repeats and not any(
+                reached.at - each.at >= _REPETITION
+                and self._telemetry.frames.whole(each.frame, reached.frame)
+                for each in currents if each.frame < reached.frame):
+            return False
+        return known == reached.seq and any(
             each.flying and each.seq == reached.seq + (not each.complete) for each in after)
 
     def _is_recorded(self, reached: UnreadReached, recorded: int | None,
