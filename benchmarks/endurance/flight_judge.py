@@ -161,8 +161,10 @@ class Judge:
                 self._mode_set(before, event)
                 if event.mode == self._shown and self.taken_at == self._taken_by_mode == event.t:
                     self._mode_undone()
-            elif event.cause == OURS and self.known_at is None:
-                self.taken_at = None  # a command sent before has arrived after it
+            elif event.cause == OURS and (self.known_at is None or (
+                    self._avoids and self._class(event.mode) is ModeClass.MISSION)):
+                # a command sent before has arrived after it; an avoidance ends by that, too
+                self.taken_at = self.known_at = None
         elif event.name == 'kill_switch' or (
                 event.name in ('armed', 'disarmed') and event.cause not in (OURS, 'self')):
             self._armed = True

@@ -186,8 +186,8 @@ def arm_command():
         1, 1, d.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
 
 
-def judged(rows, hand_over_at=-1.0, late=0.0):
-    """The faults of a PX4 on the ground; rows: time, (event, cause, mode)s, frame, command.
+def judged(rows, hand_over_at=-1.0, late=0.0, kind='px4'):
+    """The faults of a vehicle on the ground; rows: time, (event, cause, mode)s, frame, command.
 
     The operator hands it over by the service at `hand_over_at` [s], and it takes off; frames that
     come after that were sent `late` [s] before.
@@ -198,7 +198,7 @@ def judged(rows, hand_over_at=-1.0, late=0.0):
         system_status=d.MAV_STATE_STANDBY)
     world = SimpleNamespace(now=0.0, vehicle=SimpleNamespace(flight=flight), events=[],
                             tasks=None, state=None, authority=AuthorityState.UNKNOWN)
-    judge = Judge(world, 'px4', {'A': PLACE, 'B': AWAY})
+    judge = Judge(world, kind, {'A': PLACE, 'B': AWAY})
     for now, events, frame, sent in rows:
         world.now = now
         world.truth = [TruthEvent(
@@ -297,6 +297,16 @@ def test_a_heartbeat_of_before_a_hand_over_by_the_service_shows_no_kill_after_it
         (8.0, [('mode', 'pilot', px4_mode(4, 4))], heartbeat(True), None),
         (9.0, [], None, arm_command())],
         hand_over_at=3.0, late=late)
+    assert bool(counts['overridden']) is overridden
+
+
+@pytest.mark.parametrize(('mode', 'overridden'), [(3, False), (4, True)])
+def test_a_late_command_of_the_bridge_that_ends_an_avoidance_hands_back(mode, overridden):
+    avoids, auto, late = [('mode', 'failsafe', 19)], ('mode', OURS, 3), ('mode', OURS, mode)
+    counts = judged([
+        (1.0, [('armed', OURS, None), auto], heartbeat(True), None), (3.0, avoids, None, None),
+        (4.0, [], heartbeat(True), None), (5.0, [late], None, None),
+        (6.0, [], heartbeat(True), arm_command())], kind='ardupilot')
     assert bool(counts['overridden']) is overridden
 
 
