@@ -15,6 +15,7 @@ SYSTEMS = (1, 2, 3, 4)
 HOMES = {n: (400.0 * n, 0.0, 0.0) for n in SYSTEMS}  # [m] ENU
 SPEED = float(os.environ.get('SITL_SPEED', '3'))  # of SITL, times real time
 LIMIT = float(os.environ.get('SITL_LIMIT', '900'))  # [s] wall, for each phase of a SITL flight
+LAST_OUTPUT = 500  # characters of the output of an autopilot that has ended
 FIRST = int(os.environ.get('SITL_FIRST_INSTANCE', '0'))
 # Parameters with which a plain binary arms without a radio control: ArduCopter 4.5 and later.
 COPTER_DEFAULTS = """
@@ -127,7 +128,12 @@ class Sitl:
     now = staticmethod(time.monotonic)
 
     def serve(self):
-        """It flies without a pilot."""
+        """Fail where an autopilot has ended, as a PX4 does whose instance number is in use."""
+        for system, process in zip(SYSTEMS, self.processes, strict=True):
+            if process.poll() is not None:
+                output = self.folder / f'sitl_{system}' / 'output.txt'
+                raise AssertionError(f'vehicle {system} has ended with {process.returncode}:\n'
+                                     + output.read_text('utf-8', 'replace')[-LAST_OUTPUT:])
 
     def close(self):
         for process in self.processes:
