@@ -93,7 +93,7 @@ def test_it_is_refused_on_the_ground_without_takeoff(kind, state):
 def test_it_is_refused_while_the_autopilot_starts(kind):
     bench = AuthorityBench(kind, configs={1: {'boot_delay': 30.0}}).discover()
     bench.run(limit=3.0)
-    assert refused(bench, 'the autopilot is starting')
+    assert refused(bench, 'the autopilot is starting: preflight checks fail')
 
 
 @BOTH

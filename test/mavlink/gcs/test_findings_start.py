@@ -264,6 +264,25 @@ def test_finding_28_the_sensors_that_px4_calls_unhealthy_are_named():
     assert bench.noted('arm: refused for', 'preflight checks fail (3d_gyro)')
 
 
+def test_finding_28_a_px4_that_reports_uninit_as_its_checks_fail_says_why():
+    bench = FindingsBench('px4')
+    gyro, prearm = d.MAV_SYS_STATUS_SENSOR_3D_GYRO, d.MAV_SYS_STATUS_PREARM_CHECK
+
+    def checks_fail(direction, message, now):
+        if direction == 'down' and message.get_type() == 'SYS_STATUS':
+            return [(0.0, d.MAVLink_sys_status_message(
+                gyro | prearm, gyro | prearm, 0, 0, 12000, 0, 90, 0, 0, 0, 0, 0, 0))]
+        if direction == 'down' and message.get_type() == 'HEARTBEAT':
+            message.system_status = d.MAV_STATE_UNINIT
+        return None
+    bench.line.tampers.append(checks_fail)
+    bench.discover()
+    bench.run(limit=25.0)
+    why = 'the autopilot is starting: preflight checks fail (3d_gyro)'
+    assert bench.state().reason == why
+    assert bench.hand_over() == why
+
+
 # 30: texts for the operator
 
 

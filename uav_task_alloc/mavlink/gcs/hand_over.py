@@ -57,7 +57,7 @@ class HandOver:
         if telemetry.battery < _LOW_BATTERY:
             return f'battery = {telemetry.battery:.0%}: expected at least {_LOW_BATTERY:.0%}'
         if not telemetry.past_boot:
-            return 'the autopilot is starting'
+            return telemetry.starting
         if not (telemetry.airborne or telemetry.grounded):
             return 'not known whether it is in the air'
         if authority.killed and (state.armed or not telemetry.grounded):

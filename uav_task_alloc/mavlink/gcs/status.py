@@ -121,7 +121,7 @@ def why_not_available(executor: MissionExecutor, now: float) -> str:
     if mode_of(executor) is UavMode.FAULT:
         return 'it reports a critical state'
     if not telemetry.past_boot:
-        return 'the autopilot is starting'
+        return telemetry.starting
     if not telemetry.has_position:
         return 'no position yet'
     if executor.alarm:

@@ -165,6 +165,11 @@ class Telemetry:
         return self.autopilot not in ESTIMATE or self._started
 
     @property
+    def starting(self) -> str:
+        """Why it is not past boot; PX4 reports UNINIT as long as its preflight checks fail."""
+        return 'the autopilot is starting' + (f': {self.unhealthy}' if self.unhealthy else '')
+
+    @property
     def faulty(self) -> bool:
         """Whether it reports MAV_STATE_CRITICAL or worse."""
         return bool(self.status >= d.MAV_STATE_CRITICAL)
