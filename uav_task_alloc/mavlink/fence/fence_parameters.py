@@ -56,6 +56,7 @@ class FenceParameters:
         self._due = 0.0
         self._no_speed = False  # it has not answered
         self._no_answer = False  # all was requested often enough
+        self._note_return_height()
 
     def receive(self, message: Message) -> None:
         """Take a PARAM_VALUE of the vehicle, whoever requested or set it.
@@ -70,6 +71,7 @@ class FenceParameters:
         if self._profile.name == 'px4' and message.param_type in _INTEGERS:
             value = float(struct.unpack('<i', struct.pack('<f', value))[0])  # sent by its bytes
         self.values[message.param_id] = value
+        self._note_return_height()
         self._asked.pop(message.param_id, None)
 
     def is_idle(self, now: float, fences: bool = True) -> bool:
@@ -100,6 +102,7 @@ class FenceParameters:
         if not open_names:
             self._due = now + _REFRESH
             self._no_speed, self._no_answer = self._reads_speeds, True
+            self._note_return_height()
             self._asked = {}
             open_names = [name for name in names if name in self.values]
         else:
@@ -170,9 +173,12 @@ class FenceParameters:
 
     def known_return_height(self) -> float:
         """`return_height`, NaN while it is being read."""
+        return self._known_height
+
+    def _note_return_height(self) -> None:
         known = self._no_answer or not self._returns or any(
             name in self.values for name in self._returns)
-        return self.return_height if known else math.nan
+        self._known_height = self.return_height if known else math.nan
 
     @property
     def text(self) -> str:

@@ -67,7 +67,7 @@ class EndOfList:
     def empty(self, now: float) -> NextMessages:
         """With an empty list, hold or return, and keep the onboard mission; None: it has tasks."""
         onboard, telemetry, sender = self._onboard, self._telemetry, self._sender
-        end, tasks = onboard.wanted(), onboard.remaining()  # without refused tasks
+        end, tasks = onboard.list.items_and_list()  # without refused tasks
         self.going_home = False
         if tasks.stops:
             return None

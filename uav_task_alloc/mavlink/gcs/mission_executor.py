@@ -104,7 +104,17 @@ class MissionExecutor:
         self.holds = HoldRule(self.sender, self.telemetry, self.watch, profile, self.onboard,
                               execution.update_mission, self.notes)
         restore_record(record, self.onboard, self.watch, profile)
-        self._rules = (
+        progress, wanted = self.onboard.progress, self.onboard.list
+        self._news = (progress.events, progress.passed_over, progress.uncovered, progress.skipped,
+                      wanted.failed)
+        self._notes_of_parts = (self.watch.notes, self.onboard.notes, wanted.notes,
+                                self.sender.notes, self.fence.notes)
+        self._rules = self._in_order(takeoff, execution)
+
+    def _in_order(self, takeoff: Takeoff, execution: ListExecution,
+                  ) -> tuple[Callable[[float], NextMessages], ...]:
+        """The rules: the first that is not satisfied returns its messages."""
+        return (
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
             self.holds.hold, self._upload, self._read, self._has_list, self._resume,
             self._may_act, self._hold_first, self._end_of_list.held_too_long, self.holds.stay,
@@ -223,12 +233,13 @@ class MissionExecutor:
         return out
 
     def _report(self, now: float) -> None:
-        onboard, watch, sender, fence = self.onboard, self.watch, self.sender, self.fence
-        self.events += task_events(onboard, watch, now)
-        self.notes += passed_over(onboard, watch, now)
-        for notes in (watch.notes, onboard.notes, onboard.list.notes, sender.notes, fence.notes):
-            self.notes += notes
-            notes.clear()
+        if any(self._news):
+            self.events += task_events(self.onboard, self.watch, now)
+            self.notes += passed_over(self.onboard, self.watch, now)
+        if any(self._notes_of_parts):
+            for notes in self._notes_of_parts:
+                self.notes += notes
+                notes.clear()
 
     def _update_progress(self, message: Message, newest: bool, now: float) -> None:
         kind, progress, own = message.get_type(), self.onboard.progress, self.onboard.own

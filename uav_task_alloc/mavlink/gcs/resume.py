@@ -317,6 +317,9 @@ class Resume:
 
     def flown_count(self, now: float) -> int:
         """How many flown items and tasks are known; it changes where `flown_tasks` may."""
+        if not self._flown and self._progress.epoch != self._epoch:  # as at most calls
+            self._known_reached = 0
+            return self.seen_passed.count(now)
         return len(self._flown_items(now)) + self.seen_passed.count(now)
 
     def _flown_items(self, now: float) -> tuple[Item, ...]:
@@ -391,10 +394,6 @@ class Resume:
         if not self._profile.atomic:
             return True  # PX4 reports it after a take-off and a landing too
         end = to_enu(self._origin, last.x * 1e-7, last.y * 1e-7, last.z)
-        return (
-            self._profile.atomic
-            and telemetry.airborne
-            and telemetry.mode is ModeFunction.HOLD
-            and current == len(held) - 1
-            and math.dist(telemetry.position, end) < last.params[1] + LOOSE_RADIUS
-        )
+        return (telemetry.airborne and telemetry.mode is ModeFunction.HOLD
+                and current == len(held) - 1
+                and math.dist(telemetry.position, end) < last.params[1] + LOOSE_RADIUS)

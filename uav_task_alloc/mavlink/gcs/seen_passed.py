@@ -32,6 +32,8 @@ class SeenPassed:
         Args:
             now: steady time [s].
         """
+        if not self._places:
+            return 0
         self._until = min(self._until, now + _AGE)
         return len(self._places) if now < self._until else 0
 

@@ -37,6 +37,8 @@ def allowed_messages(messages: list[Message], watch: AuthorityWatch, now: float)
     Returns:
         Those that may be sent, in order; the others are dropped.
     """
+    if not messages:
+        return messages
     allowed = []
     for message in messages:
         action = action_of(message)

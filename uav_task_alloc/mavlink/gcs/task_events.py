@@ -12,8 +12,6 @@ def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
     """Events of tasks since the last call; completed ones are marked in the authority record."""
     events: list[TaskProgress] = []
     progress, revision = onboard.progress, onboard.revision
-    if not progress.events and not onboard.list.failed:  # as at most calls
-        return events
     while progress.events:
         event = progress.events.popleft()
         kind = 'COMPLETED' if event.completed else 'STARTED'

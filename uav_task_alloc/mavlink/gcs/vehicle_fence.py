@@ -35,7 +35,7 @@ from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
-from uav_task_alloc.model import Point
+from uav_task_alloc.model import Point, ThreatZone
 
 _PERIOD = 1.0  # [s] between choices
 _SETTLED = 2.0  # [s] in the air without a change of the wanted fence: the new list comes first
@@ -84,7 +84,7 @@ class VehicleFence:
         self.parameters = FenceParameters(peer, profile)
         onboard.list.read_speed = self.parameters.cruise_speed
         way_home = onboard.list.way_home
-        way_home.zones = lambda: () if self._flies_around else self._policy().zones
+        way_home.zones = self._zones_to_avoid
         way_home.return_height = self.parameters.known_return_height
         self.notes: deque[OperatorNote] = deque()
         self.fence = Fence()
@@ -99,16 +99,19 @@ class VehicleFence:
         self._own[store] = own
         memory.save(frozenset().union(*self._own.values()))
 
-    @property
-    def _flies_around(self) -> bool:
-        """Whether the vehicle itself flies around all zones; not for a moment, by a readback."""
-        state = self.state
+    def _zones_to_avoid(self) -> tuple[ThreatZone, ...]:
+        """The zones in force; none where the vehicle itself flies around all of them."""
+        policy = self._policy()
+        if policy.fences == 'off':
+            self._was_verified = False
+            return policy.zones
+        state = self.transfer.state
         if state is FenceState.VERIFIED:
             self._was_verified = True
-        elif state not in (FenceState.UNKNOWN, FenceState.UPLOADING):
+        elif state not in (FenceState.UNKNOWN, FenceState.UPLOADING):  # not by a readback
             self._was_verified = False
-        return (self._was_verified and self.active and self.parameters.plans_around
-                and not self.left_out)
+        around = self._was_verified and self.parameters.plans_around and not self.left_out
+        return () if around else policy.zones
 
     @property
     def active(self) -> bool:

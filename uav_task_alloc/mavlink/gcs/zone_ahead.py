@@ -46,8 +46,10 @@ class ZoneAhead:
         """
         telemetry, onboard, progress = self._telemetry, self._onboard, self._onboard.progress
         zones, seq = onboard.list.way_home.zones(), onboard.set_current_to
+        if not zones:
+            return None
         seq = progress.current if seq is None else seq
-        if not zones or seq is None or not telemetry.has_position:
+        if seq is None or not telemetry.has_position:
             return None
         key = telemetry.position_at, seq, progress.epoch, zones, held
         if self._found[0] != key:

@@ -288,6 +288,8 @@ class CurrentItem:
             Their ids, and since then 0: it has not, 1: it has, 2: perhaps, as nothing has shown
             the mode since.
         """
+        if not self.passed.claims:  # as at most calls
+            return NO_TASKS, 0
         claims = [claim for claim in self.passed.claims
                   if claim.in_flight or self.left_unseen_since(claim)]
         if not claims:

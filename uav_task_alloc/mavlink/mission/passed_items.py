@@ -73,8 +73,9 @@ class PassedItems:
 
     def seen(self) -> tuple[Item, ...]:
         """Items of open claims at which the vehicle was seen, where nothing more will come."""
-        return tuple(item for claim in self.claims for item in claim.items
-                     if self._visit(item, claim) is Visit.YES or self._approached(item, claim))
+        return () if not self.claims else tuple(
+            item for claim in self.claims for item in claim.items
+            if self._visit(item, claim) is Visit.YES or self._approached(item, claim))
 
     def in_order(self) -> frozenset[str]:
         """Tasks of open claims that were passed one by one, as a mission is flown."""

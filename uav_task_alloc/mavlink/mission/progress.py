@@ -49,6 +49,13 @@ class ProgressTable:
         restarted: the mission began again from its first item.
         flew: it was in mission mode, and has left it since.
         task, tasks: ids.
+
+    Attributes:
+        completed: the completed tasks of all epochs in order, and where each was [m] ENU.
+        events: tasks that started or completed; this and the next are taken by the caller.
+        skipped: tasks skipped by another station.
+        passed_over: items passed and not known to be flown.
+        uncovered: tasks whose way was not flown as a whole.
     """
 
     def __init__(self, frames: FrameLog | None = None, repeats: bool = False,
@@ -69,6 +76,11 @@ class ProgressTable:
             self._epoch, self._tasks, self.positions, self._moves)
         self.path, self.previous_returned = self.positions.path, self._epochs.has_returned
         self.reports = self._moves.reports
+        self.completed: dict[str, Point | None] = self._tasks.places
+        self.events: deque[ProgressEvent] = self._tasks.events
+        self.skipped: deque[str] = self._moves.skipped
+        self.passed_over: deque[Item] = self._moves.passed_over
+        self.uncovered: deque[str] = self._tasks.uncovered
 
     @property
     def epoch(self) -> int:
@@ -106,26 +118,6 @@ class ProgressTable:
         return self._epoch.returns
 
     @property
-    def completed(self) -> dict[str, Point | None]:
-        """The completed tasks of all epochs in order, and where each was [m] ENU."""
-        return self._tasks.places
-
-    @property
-    def events(self) -> deque[ProgressEvent]:
-        """Tasks that started or completed, to be taken by the caller."""
-        return self._tasks.events
-
-    @property
-    def skipped(self) -> deque[str]:
-        """Tasks skipped by another station, to be taken by the caller."""
-        return self._moves.skipped
-
-    @property
-    def passed_over(self) -> deque[Item]:
-        """Items passed and not known to be flown, to be taken by the caller."""
-        return self._moves.passed_over
-
-    @property
     def set_by_other(self) -> int | None:
         """The current item, where another station has set it."""
         return self._moves.set_by_other
@@ -141,11 +133,6 @@ class ProgressTable:
         claims, doubtful = self._moves.passed.claims, self._tasks.doubtful
         return frozenset(chain((i.task for claim in claims for i in claim.items), doubtful)) if (
             claims or doubtful) else NO_TASKS
-
-    @property
-    def uncovered(self) -> deque[str]:
-        """Tasks whose way was not flown as a whole, to be taken by the caller."""
-        return self._tasks.uncovered
 
     @property
     def passed_in_order(self) -> frozenset[str]:

@@ -192,6 +192,12 @@ class WantedMission:
                 self._state = state
         return self._remaining[1]
 
+    def items_and_list(self) -> tuple[tuple[Item, ...], TaskList]:
+        """The items to fly from here, and the rest of the list that they are of."""
+        items = self.items()
+        assert self._remaining is not None
+        return items, self._remaining[1]
+
     def leave_out_detours(self) -> bool:
         """Leave out those detour points of the first leg to which a zone is now between.
 
