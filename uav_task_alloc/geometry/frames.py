@@ -2,6 +2,7 @@
 """WGS84 to ENU and back around one origin; up is not height above ground, as the earth curves."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -13,6 +14,8 @@ from uav_task_alloc.checks import check_number
 from uav_task_alloc.model import Point
 
 _WGS84 = pymap3d.Ellipsoid.from_name('wgs84')
+_MAJOR, _MINOR = _WGS84.semimajor_axis, _WGS84.semiminor_axis  # [m]
+_MAJOR_SQUARE, _RATIO_SQUARE = _MAJOR**2, (_MINOR / _MAJOR) ** 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +65,13 @@ def to_enu(origin: Origin, latitude: float, longitude: float, altitude_amsl: flo
 def _ecef(latitude: float, longitude: float, altitude: float,
           ) -> tuple[Point, float, float, float, float]:
     """ECEF [m], and cosine and sine of latitude and longitude, as `pymap3d.geodetic2ecef`."""
-    lat, lon = np.radians(latitude), np.radians(longitude)
+    lat, lon = math.radians(latitude), math.radians(longitude)  # sines of math may differ
     cos_lat, sin_lat = float(np.cos(lat)), float(np.sin(lat))
     cos_lon, sin_lon = float(np.cos(lon)), float(np.sin(lon))
-    a, b = _WGS84.semimajor_axis, _WGS84.semiminor_axis
-    n = a**2 / float(np.hypot(a * cos_lat, b * sin_lat))  # radius of the prime vertical [m]
+    # radius of the prime vertical [m]
+    n = _MAJOR_SQUARE / float(np.hypot(_MAJOR * cos_lat, _MINOR * sin_lat))
     return ((n + altitude) * cos_lat * cos_lon, (n + altitude) * cos_lat * sin_lon,
-            (n * (b / a) ** 2 + altitude) * sin_lat), cos_lat, sin_lat, cos_lon, sin_lon
+            (n * _RATIO_SQUARE + altitude) * sin_lat), cos_lat, sin_lat, cos_lon, sin_lon
 
 
 @lru_cache(maxsize=16)

@@ -195,10 +195,12 @@ class FlownPath:
     def fastest(self) -> float:
         """The highest speed [m/s] of late; the usual one where it has hardly moved."""
         speeds = self._speeds[-200:]
-        if speeds and (top := max(speeds)) >= _USUAL_SPEED:
+        top = max(speeds, default=0.0)
+        if top >= _USUAL_SPEED:
             return top
-        moving = len([speed for speed in speeds if speed > _HOLD_SPEED])
-        return max((5.0 if moving >= _FEW else _USUAL_SPEED, *speeds))
+        moved = top > _HOLD_SPEED and (
+            len([speed for speed in speeds if speed > _HOLD_SPEED]) >= _FEW)
+        return max(top, 5.0) if moved else _USUAL_SPEED
 
     def _since(self, since: float, until: float = math.inf) -> list[PositionSample]:
         at = bisect_left(self._samples, since, key=lambda one: one.t)

@@ -238,8 +238,13 @@ class PositionHistory:
 
     def sent_between(self, frame: int) -> tuple[float, float]:
         """Vehicle times [s] between which a frame was sent, by its order among the positions."""
-        before = max((t for f, t in self._stamps if f < frame), default=-math.inf)
-        after = min((t for f, t in self._stamps if f > frame), default=math.inf)
+        before, after = -math.inf, math.inf
+        for number, t in self._stamps:
+            if number < frame:
+                if t > before:
+                    before = t
+            elif number > frame and t < after:
+                after = t
         return (before, after) if before <= after else (-math.inf, math.inf)
 
     def sent_before(self, frame: int, otherwise: float, earliest: bool) -> float:

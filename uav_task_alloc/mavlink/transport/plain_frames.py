@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import struct
 from collections.abc import Callable
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -18,7 +18,6 @@ HEADER, CHECKSUM = 10, 2  # bytes of a frame before and after the payload
 V2 = dialect.PROTOCOL_MARKER_V2
 _HEADER = struct.Struct('<BBBBBBBHB')
 _CHECKSUM = struct.Struct('<H')
-_FAST_CRC: Any = getattr(dialect, 'mcrf4xx', None)  # where it is installed
 _CRC_START = 0xFFFF
 
 
@@ -29,21 +28,23 @@ class _Layout:
         kind: class of the message, of which each field is one number.
     """
 
-    __slots__ = ('crc_extra', 'fixed', 'kind', 'names', 'order', 'size', 'unpack', 'values')
+    __slots__ = ('crc_extra', 'fixed', 'kind', 'names', 'size', 'unpack', 'values')
 
     def __init__(self, kind: Any) -> None:
-        self.kind, self.crc_extra, self.names = kind, bytes((kind.crc_extra,)), kind.fieldnames
+        self.kind, self.crc_extra = kind, bytes((kind.crc_extra,))
+        self.names = kind.ordered_fieldnames  # as on the wire
         self.unpack, self.size = kind.unpacker.unpack, kind.unpacker.size
-        self.order: Callable[[Any], Any] = itemgetter(*kind.orders)
-        self.values: Callable[[Any], Any] = attrgetter(*kind.ordered_fieldnames)
+        self.values: Callable[[Any], Any] = attrgetter(*self.names)
         empty = vars(kind(*range(len(self.names))))
         self.fixed = {name: value for name, value in empty.items() if name not in self.names}
 
 
-def _crc(content: bytes) -> int:
-    if _FAST_CRC is not None:
-        return int(_FAST_CRC(content, _CRC_START))
+def _slow_crc(content: bytes, start: int) -> int:
     return int(dialect.x25crc(content).crc)
+
+
+# the fast one where it is installed
+_crc: Callable[[bytes, int], int] = getattr(dialect, 'mcrf4xx', None) or _slow_crc
 
 
 @functools.cache
@@ -72,14 +73,15 @@ def decode_plain(frame: bytearray) -> Any | None:
     if layout is None:
         return None
     (crc,) = _CHECKSUM.unpack_from(frame, HEADER + length)
-    if _crc(bytes(frame[1:-CHECKSUM]) + layout.crc_extra) != crc:
+    content = bytes(frame)
+    if _crc(content[1:-CHECKSUM] + layout.crc_extra, _CRC_START) != crc:
         return None
-    payload = frame[HEADER:HEADER + min(length, layout.size)]
+    payload = content[HEADER:HEADER + min(length, layout.size)]
     values = layout.unpack(payload.ljust(layout.size, b'\0'))
     message = object.__new__(layout.kind)
     fields = message.__dict__
     fields.update(layout.fixed)
-    fields.update(zip(layout.names, layout.order(values), strict=True))
+    fields.update(zip(layout.names, values, strict=True))
     message._msgbuf, message._payload, message._crc = frame, frame[6:-CHECKSUM], crc
     message._header = dialect.MAVLink_header(number, incompatible, compatible, length, seq, system,
                                              component)
@@ -108,7 +110,7 @@ def pack_plain(message: Any, mav: Any) -> bytes | None:
     length, seq, system, component = len(payload), mav.seq, mav.srcSystem, mav.srcComponent
     content = _HEADER.pack(V2, length, 0, 0, seq, system, component, number & 0xffff, number >> 16
                            ) + payload
-    crc = _crc(content[1:] + layout.crc_extra)
+    crc = _crc(content[1:] + layout.crc_extra, _CRC_START)
     frame = content + _CHECKSUM.pack(crc)
     message._header = dialect.MAVLink_header(number, 0, 0, length, seq, system, component)
     message._payload, message._msgbuf, message._crc = payload, bytearray(frame), crc
