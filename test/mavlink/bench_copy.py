@@ -45,13 +45,20 @@ def bench_copy(bench):
     copiers = copy._deepcopy_dispatch
     before = dict(copiers)
     copiers.update(dict.fromkeys(_UNCHANGEABLE, lambda value, memo: value))
-    copiers.update(dict.fromkeys(d.mavlink_map.values(), lambda message, memo: copy.copy(message)))
+    copiers.update(dict.fromkeys(d.mavlink_map.values(), _message_copy))
     copiers[FunctionType] = _function_copy
     try:
         return copy.deepcopy(bench)
     finally:
         copiers.clear()
         copiers.update(before)
+
+
+def _message_copy(message, memo):
+    """As `copy.copy`, several times as fast."""
+    new = object.__new__(message.__class__)
+    new.__dict__.update(message.__dict__)
+    return new
 
 
 def _function_copy(function, memo):

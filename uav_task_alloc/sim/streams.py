@@ -52,8 +52,9 @@ class Streams:
         """The messages that are due by `now` [s]."""
         out: list[Message] = []
         for number, due in self._due.items():
-            while due <= now:
-                out += self._makers[number]()
-                due += self._interval[number]
-            self._due[number] = due
+            if due <= now:
+                while due <= now:
+                    out += self._makers[number]()
+                    due += self._interval[number]
+                self._due[number] = due
         return out
