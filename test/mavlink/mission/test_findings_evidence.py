@@ -390,24 +390,6 @@ def test_beside_a_leg_on_the_inner_side_of_the_turn_it_may_have_flown_straight(y
         [(0.0, 15.0, 50.0)], (150.0, 0.0, 50.0), 0.0, 0.0) is flown
 
 
-@pytest.mark.parametrize(('x', 'seconds', 'completed'), [
-    (97.0, 0.4, ['A']), (97.0, 2.4, []),  # another station may have set the current item since
-    (90.0, 0.4, [])])
-def test_an_item_reached_just_as_the_bridge_holds_the_vehicle_is_known(x, seconds, completed):
-    flight = Flight(repeats=False)
-    flight.begin(A=100.0, B=500.0)
-    flight.fly_to(x)
-    flight.table.note_current(0, flight.now, True, flight.frame())
-    flight.table.note_other_mode(flight.now)
-    flight.stay(0.2, SPEED)
-    flight.stay(0.2, 0.5 * SPEED)
-    flight.stay(seconds - 0.4 or 0.0)
-    flight.table.note_current(1, flight.now, False, flight.frame())
-    flight.lost = True
-    flight.stay(10.0)
-    assert list(flight.table.completed) == completed
-
-
 @BOTH
 def test_a_position_of_before_a_reboot_that_comes_after_it_is_dropped(kind):
     bench = flying(kind, 'AB')

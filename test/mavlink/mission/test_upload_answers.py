@@ -85,17 +85,6 @@ def test_fault_14_each_nak_has_the_effect_of_the_table(kind, result, when):
 
 
 @BOTH
-def test_an_error_after_the_last_item_leads_to_a_readback_not_to_another_upload(kind):
-    bench = UploadBench(kind)
-    bench.line.tampers.append(drop({'MISSION_ACK'}, 1, 'down'))
-    mission = bench.replace(bench.mission())
-    assert bench.run(lambda: bench.upload.sent_all, 5.0)
-    bench.from_vehicle(ack(1))  # to a late copy of an item
-    verified(bench, mission)
-    assert len(bench.line.sent('MISSION_COUNT')) == 1
-
-
-@BOTH
 def test_fault_15_denied_backs_off_eight_seconds_or_more_with_jitter(kind):
     waits = set()
     for seed in range(3):

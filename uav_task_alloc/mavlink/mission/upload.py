@@ -63,7 +63,6 @@ class UploadEvent(Enum):
     CANCELLED = 'ACK cancelled'
     REFUSED = 'ACK refused permanently'
     TIMEOUT = 'timeout'
-    UNSURE = 'timeout after the last item'
     EXHAUSTED = 'no tries left'
     MATCH = 'readback matches'
     MISMATCH = 'readback differs'
@@ -81,8 +80,7 @@ TRANSITIONS: dict[UploadState, dict[UploadEvent, UploadState]] = {
     _S.COUNTING: {**_WHILE_OPEN, _E.TIMEOUT: _S.COUNTING},
     _S.SENDING: {**_WHILE_OPEN, _E.TIMEOUT: _S.READING},
     _S.CONFIRMING: {**_WHILE_OPEN, _E.TIMEOUT: _S.READING},
-    _S.GRACE: {**_WHILE_OPEN, _E.ERROR: _S.GRACE, _E.TIMEOUT: _S.BACKOFF,
-               _E.UNSURE: _S.READING},
+    _S.GRACE: {**_WHILE_OPEN, _E.ERROR: _S.GRACE, _E.TIMEOUT: _S.BACKOFF},
     _S.BACKOFF: {_E.START: _S.BACKOFF, _E.REQUEST: _S.SENDING, _E.LAST: _S.CONFIRMING,
                 _E.ACCEPTED: _S.READING, _E.TIMEOUT: _S.COUNTING, _E.EXHAUSTED: _S.IDLE},
     _S.DRAINING: {_E.START: _S.DRAINING, _E.CANCELLED: _S.COUNTING, _E.TIMEOUT: _S.COUNTING,
@@ -208,8 +206,7 @@ class Upload:
             self._out += self._readback.step(now)
             self._judge_readback(now)
         elif self.busy and now >= self._due:
-            unsure = self.state is UploadState.GRACE and self._sent_last
-            self._go(UploadEvent.UNSURE if unsure else UploadEvent.TIMEOUT, now)
+            self._go(UploadEvent.TIMEOUT, now)
         return self._flush()
 
     def _flush(self) -> list[Message]:
