@@ -252,24 +252,6 @@ def confirm(flight, reports, new, begin, plan=0):
     reports.replay(of_new, plan)
 
 
-@pytest.mark.parametrize(('shown', 'completed'), [(False, []), (True, ['A'])])
-def test_a_reboot_while_another_mission_may_be_on_board_completes_no_item_by_its_place(
-        shown, completed):
-    flight = Flight()
-    flight.begin(A=100.0, X=900.0)
-    flight.table.note_current(0, flight.now, True, flight.frame())
-    reports, new = upload_during(flight, B=600.0)
-    flight.fly_to(93.0)
-    reports.note_sent(flight.frame())
-    flight.fly_to(100.0)
-    frame = flight.frame()
-    flight.table.note_in_mission(frame)
-    if shown:  # by PX4's id of the old mission
-        reports.release(frame)
-    flight.table.invalidate(reports.end(new))
-    assert list(flight.table.completed) == completed
-
-
 def test_a_kept_reached_counts_however_far_the_vehicle_has_flown_since():
     flight = Flight()
     flight.begin(A=100.0, X=900.0)

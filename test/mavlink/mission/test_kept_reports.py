@@ -139,3 +139,21 @@ def test_a_task_whose_item_of_an_earlier_upload_came_late_and_was_stored_is_flow
     if then == 'pilot':
         assert bench.hand_over() == ''
     flown_once_each(bench, 'ABCD' if then == 'newer list' else 'ABC')
+
+
+@pytest.mark.parametrize(('shown', 'completed'), [(False, []), (True, ['A'])])
+def test_a_reboot_while_another_mission_may_be_on_board_completes_no_item_by_its_place(
+        shown, completed):
+    flight = Flight()
+    flight.begin(A=100.0, X=900.0)
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    reports, new = upload_during(flight, B=600.0)
+    flight.fly_to(93.0)
+    reports.note_sent(flight.frame())
+    flight.fly_to(100.0)
+    frame = flight.frame()
+    flight.table.note_in_mission(frame)
+    if shown:  # by PX4's id of the old mission
+        reports.release(frame)
+    flight.table.invalidate(reports.end(new))
+    assert list(flight.table.completed) == completed
