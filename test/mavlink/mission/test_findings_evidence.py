@@ -388,16 +388,3 @@ def test_beside_a_leg_on_the_inner_side_of_the_turn_it_may_have_flown_straight(y
     path.add(PositionSample(12.0, (30.0, y, 50.0), (15.0, 0.0, 0.0)))
     assert path.could_have_flown(
         [(0.0, 15.0, 50.0)], (150.0, 0.0, 50.0), 0.0, 0.0) is flown
-
-
-@BOTH
-def test_a_position_of_before_a_reboot_that_comes_after_it_is_dropped(kind):
-    bench = flying(kind, 'AB')
-    bench.run(limit=10.0)
-    late = bench.line.sent('GLOBAL_POSITION_INT', 'down')[-1]
-    bench.vehicles[1].reboot(bench.now)
-    assert bench.run(lambda: bench.onboard().progress.path.newest < 5.0, 5.0)
-    bench.run(limit=1.0)
-    bench.from_vehicle(late)
-    bench.run(limit=1.0)
-    assert bench.onboard().progress.path.newest < 10.0

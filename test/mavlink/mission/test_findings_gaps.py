@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gaps that are no evidence, and ends that begin again; found by flights at random."""
 import pytest
+from authority_bench import BOTH, flying
 from evidence_bench import SPEED, Flight
 
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
@@ -105,3 +106,16 @@ def test_a_position_of_a_restart_that_is_not_noticed_yet_hides_no_task_passed_be
                               flight.now, flight.frames.note(round(20 * flight.now), flight.now))
     flight.table.invalidate()
     assert list(flight.table.completed) == ['A']
+
+
+@BOTH
+def test_a_position_of_before_a_reboot_that_comes_after_it_is_dropped(kind):
+    bench = flying(kind, 'AB')
+    bench.run(limit=10.0)
+    late = bench.line.sent('GLOBAL_POSITION_INT', 'down')[-1]
+    bench.vehicles[1].reboot(bench.now)
+    assert bench.run(lambda: bench.onboard().progress.path.newest < 5.0, 5.0)
+    bench.run(limit=1.0)
+    bench.from_vehicle(late)
+    bench.run(limit=1.0)
+    assert bench.onboard().progress.path.newest < 10.0
