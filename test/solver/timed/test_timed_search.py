@@ -15,7 +15,9 @@ from uav_task_alloc.solver.solve import plan
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK
 from uav_task_alloc.solver.timed.colony import COLD, TimedColony
+from uav_task_alloc.solver.timed.insertion import near_place
 from uav_task_alloc.solver.timed.order import route_order, set_order
+from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
 from uav_task_alloc.solver.timed.ruin import (
     REMOVED,
@@ -176,6 +178,57 @@ def test_a_search_through_excess_that_finds_nothing_better_goes_on_without():
         allowed = bool(np.isfinite(colony.arrays.price).any())
         assert allowed == (0.02 <= share < 0.595), share
     assert colony.routes.counts[at.INFEASIBLE] == 0
+
+
+def cheapest_place(a, routes, t):
+    """The cost of the cheapest place of task t in any route."""
+    least = math.inf
+    for u in range(a.uavs):
+        c = u
+        while c < a.ends:
+            least = min(least, cost_at(a, routes, LINK(u), t, LINK(c)))
+            c = int(routes.link[c, at.NEXT])
+    return least
+
+
+@pytest.mark.parametrize('returns', [True, False])
+@pytest.mark.parametrize('grain', [0.0, 10.0])
+def test_neighbours_passed_over_by_their_legs_have_no_cheaper_place(returns, grain):
+    fleet, work = mixed_problem(12)
+    rules = Rules(returns=returns, grain=grain)
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony.fly(0.0, 0.01, 500)
+    a, routes, w, rng = colony.arrays, colony.routes, empty_round(colony.arrays), rng_state(1)
+    found = []
+    for _ in range(100):
+        begin_round(routes, w)
+        ruin_strings(a, routes, w, 10.0, 10, 0.0, rng)
+        for t in w.removed[:w.counts[REMOVED]]:
+            place, _, cost = near_place(a, routes, t, True, 0.0, rng)
+            found.append((cost if place >= 0 else math.inf, cheapest_place(a, routes, t)))
+        insert_removed(a, routes, w, 1.0, 0.0, 0.0, rng)
+    near, least = zip(*found, strict=True)
+    assert sum(map(math.isfinite, near)) > 300
+    assert near == pytest.approx(least, abs=1e-6)
+
+
+def test_reach_kept_during_search_is_that_of_the_legs():
+    fleet, work = mixed_problem(13)
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules(returns=True)), {})
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony.fly(0.0, 0.5, 2000)
+    a, routes = colony.arrays, colony.routes
+    for t in range(a.uavs, a.ends):
+        inner = outer = -math.inf
+        if routes.link[t, at.OF_UAV] < a.uavs:
+            for other, column in ((at.NEXT, at.LEG), (at.PREV, at.LEG_TO)):
+                leg = routes.row[t, column]
+                if a.uavs <= routes.link[t, other] < a.ends:
+                    inner = max(inner, leg)
+                else:
+                    outer = max(outer, leg)
+        assert routes.reach[t].tolist() == [inner, outer]
 
 
 def selection_problem():

@@ -3,7 +3,7 @@
 
 # columns of TimedArrays.fixed, by node
 X, Y, Z, SERVICE, OPENS, CLOSES, RELEASE, LOAD = range(8)  # RELEASE: no earlier leg to it
-TRIP_RELEASE, DUE, WEIGHT, WORTH, WIDTH, REMOTE, ANNOUNCED = range(8, 15)
+TRIP_RELEASE, DUE, WEIGHT, WORTH, WIDTH, REMOTE, ANNOUNCED, BASE_WAY = range(8, 16)
 FIXED_COLUMNS = 16
 # columns of TimedArrays.begin, by UAV: ready for its first leg, time in the air by then, latest
 # departure, length and time of its route without tasks, whether this trip began at the base,
@@ -18,6 +18,9 @@ BY_DISTANCE, BY_FINISH, BY_LATENESS, BY_END, BY_EXCESS = range(5)
 NEXT, PREV, OF_UAV, HEAD = range(4)  # OF_UAV: m where a task is in no route
 # columns of TimedRoutes.way, by node: row of TimedArrays.fixed and point where it begins and ends
 ENTER, LEAVE = range(2)
+# columns of TimedRoutes.reach, by node: its longest leg [m] to a task, to another node; -inf:
+# there is none, inf: places there are tried however far away
+INNER, OUTER = range(2)
 # columns of TimedRoutes.row, by node; LEG: to the next one, LEG_TO: from the one before, of tasks
 START, DEPARTURE, LATEST, WARP_BEFORE, WARP_AFTER, LEG, TIME, LEG_TO = range(8)
 RATE, LOAD_BEFORE, LENGTH_BEFORE, LASTED, LEFT, LASTS, EARLY, WAITS = range(8, 16)

@@ -101,6 +101,25 @@ def _place_beside(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
 
 
 @inline_kernel
+def _within_reach(a: TimedArrays, r: TimedRoutes, i: int, side: int, least: float) -> int:
+    """The first of these sides of neighbours of task i where a place may cost less. O(k).
+
+    Most neighbours are passed over, by what a few lines of the cache hold.
+    """
+    if side & 1:
+        return side
+    weight, base_way = a.weight[at.BY_DISTANCE], a.fixed[a.uavs + i, at.BASE_WAY]
+    k = side >> 1
+    while k < a.near_count[i]:
+        c, apart = a.near[i, k], a.near_length[i, k]
+        inner, outer = apart - r.reach[c, at.INNER], base_way - r.reach[c, at.OUTER]
+        if not weight * (apart + (inner if inner < outer else outer)) >= least:
+            break
+        k += 1
+    return int(side if k == side >> 1 else 2 * k)
+
+
+@inline_kernel
 def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: float,
                     rng: RngState) -> tuple[int, int, float]:
     """The cheapest place beside neighbours and in empty routes: (node before, kind, cost). O(k).
@@ -110,8 +129,12 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
     opens: empty routes are tried, too. Each place is skipped with probability `blinks`.
     """
     i, place, kind, least = t - a.uavs, -1, NO_VISIT, math.inf
-    sides = 2 * a.near_count[i]
-    for m in range(sides + (a.near_class.shape[1] if opens else 0)):
+    sides, m = 2 * a.near_count[i], -1
+    last = sides + (a.near_class.shape[1] if opens else 0)
+    while True:
+        m = _within_reach(a, r, i, m + 1, least)
+        if m >= last:
+            break
         if m < sides:
             before = _place_beside(a, r, t, m, least)
         else:
@@ -188,6 +211,7 @@ def unlink(a: TimedArrays, r: TimedRoutes, t: int) -> None:
     r.route[u, at.METRES] += added
     r.sums[at.METRES] += added
     r.link[t, at.OF_UAV] = LINK(a.uavs)
+    r.reach[t, at.INNER] = r.reach[t, at.OUTER] = -math.inf
     if not is_task(a, t):
         return
     if not a.whole:

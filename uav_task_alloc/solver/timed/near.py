@@ -110,6 +110,24 @@ def _fill_near_tasks(a: TimedArrays, known: KnownNear, pace: float) -> None:
 
 
 @inline_kernel
+def _least_base_way(a: TimedArrays, t: int) -> float:
+    """Least length [m] of a leg between task t and a start or home, or less. O(1).
+
+    0 where there are many classes of UAVs: to read all their homes would delay a warm plan.
+    """
+    classes, least = a.first_member.size - 1, math.inf
+    if not a.returns or classes > a.near_class.shape[1]:
+        return 0.0
+    for k in range(classes):
+        u = a.members[a.first_member[k]]
+        start, _ = nearest_ends(a, t, u)
+        home, _ = nearest_ends(a, t, a.ends + u)
+        least = min(least, start, home)
+    cut = 2.0 / a.grain if a.grain > 0.0 else 0.0
+    return float(math.sqrt(least) - cut if classes > 0 else 0.0)
+
+
+@inline_kernel
 def _fill_near_classes(a: TimedArrays, squares: Floats) -> None:
     """Fill a.near_class and REMOTE with the nearest starts of classes. O(n classes).
 
@@ -130,3 +148,4 @@ def _fill_near_classes(a: TimedArrays, squares: Floats) -> None:
             squares[place], a.near_class[i, place] = square, k
             kept = min(kept + 1, c)
         a.fixed[t, at.REMOTE] = math.sqrt(squares[0]) if kept > 0 else 0.0
+        a.fixed[t, at.BASE_WAY] = _least_base_way(a, t)

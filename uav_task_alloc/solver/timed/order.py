@@ -20,6 +20,7 @@ def _reset(a: TimedArrays, r: TimedRoutes) -> None:
     r.route[:] = 0.0
     r.trip[:] = 0.0
     r.link[:, at.OF_UAV] = a.uavs
+    r.reach[:] = -math.inf
     for i in range(a.ends - a.uavs):
         r.sums[at.UNSERVED_COST] += a.unserved[i]
     for u in range(a.uavs):

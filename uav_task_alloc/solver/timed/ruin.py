@@ -7,6 +7,7 @@ back.
 """
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from uav_task_alloc.solver.timed.insertion import (
     unlink,
 )
 from uav_task_alloc.solver.timed.places import cheapest_direction
-from uav_task_alloc.solver.timed.segments import slot_of, update
+from uav_task_alloc.solver.timed.segments import set_reach, slot_of, update
 from uav_task_alloc.solver.timed.ways import has_paths, is_task
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
@@ -115,6 +116,7 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
     """Restore all routes that the round changed. O(their tasks)."""
     for k in range(w.counts[REMOVED]):
         r.link[w.removed[k], at.OF_UAV] = LINK(a.uavs)
+        r.reach[w.removed[k], at.INNER] = r.reach[w.removed[k], at.OUTER] = -math.inf
     for k in range(w.counts[SAVED_ROUTES]):
         u = w.uav[k]
         if (r.route[u, at.TASKS] == 0.0) != (w.route[k, at.TASKS] == 0.0):
@@ -134,7 +136,9 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
         if a.whole or a.timed_cost:
             for c in range(at.RATE, at.ROW_COLUMNS):
                 r.row[i, c] = w.row[k, c]
-        if i < a.uavs or i >= a.bases:
+        if is_task(a, i):
+            set_reach(a, r, i)
+        elif i < a.uavs or i >= a.bases:
             slot = slot_of(a, i)
             for c in range(at.TRIP_COLUMNS):
                 r.trip[slot, c] = w.trip[slot, c]

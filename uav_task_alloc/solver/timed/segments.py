@@ -17,7 +17,7 @@ from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.path_times import path_seconds
-from uav_task_alloc.solver.timed.ways import has_paths, service_of, way_length
+from uav_task_alloc.solver.timed.ways import has_paths, is_task, service_of, way_length
 
 
 @inline_kernel
@@ -66,6 +66,23 @@ def after_leg(a: TimedArrays, departure: float, seconds: float, j: int) -> float
     """Arrival at node j after a leg, not set out on before its release. O(1)."""
     release = a.fixed[j, at.RELEASE]
     return (departure if departure > release else release) + seconds
+
+
+@inline_kernel
+def set_reach(a: TimedArrays, r: TimedRoutes, i: int) -> None:
+    """Set TimedRoutes.reach of node i, whose neighbours in its route are known. O(1)."""
+    inner = outer = -math.inf
+    if r.link[i, at.NEXT] < a.ends:
+        inner = r.row[i, at.LEG]
+    else:
+        outer = r.row[i, at.LEG]
+    if is_task(a, r.link[i, at.PREV]):
+        inner = max(inner, r.row[i, at.LEG_TO])
+    else:
+        outer = max(outer, r.row[i, at.LEG_TO])
+    if outer > -math.inf and (a.visits > 0 or has_paths(a)):
+        outer = math.inf  # a visit of the base may cost less than its way
+    r.reach[i, at.INNER], r.reach[i, at.OUTER] = inner, outer
 
 
 @inline_kernel
@@ -203,9 +220,12 @@ def update_part(a: TimedArrays, r: TimedRoutes, u: int, first: int, last: int,
     Goes on from them in both directions until nothing changes. O(tasks) at worst, O(1) mostly.
     """
     i, passed, end = first, first == last, a.ends + u
+    set_reach(a, r, first)
     while i != end:
         j = r.link[i, at.NEXT]
         changed = _step_forward(a, r, u, i, j)
+        if not passed:
+            set_reach(a, r, j)
         if passed and not changed:
             break
         passed = passed or j == last
@@ -253,6 +273,7 @@ def _trip_forward(a: TimedArrays, r: TimedRoutes, u: int, head: int) -> int:
         r.row[j, at.LASTED] = lasted + wait + service_of(a, r, u, j)
         r.row[j, at.LOAD_BEFORE], r.row[j, at.LENGTH_BEFORE] = load, metres
         r.link[j, at.HEAD] = head
+        set_reach(a, r, j)
         i = j
     r.trip[slot, at.CARRIED], r.trip[slot, at.FLOWN] = load, metres
     r.trip[slot, at.AIRBORNE] = lasted
