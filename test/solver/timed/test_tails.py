@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Exchange of the ends of routes: it costs less, and what routes sum up stays true."""
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -78,7 +79,7 @@ def test_sums_after_exchanges_are_those_of_routes_set_at_once(objective):
             begin_round(routes, w)
             list_absent(a, routes, w)
             ruin_strings(a, routes, w, 10.0, 10, 0.0, rng)
-            insert_removed(a, routes, w, 1.0, 0.0, 0.3, rng)
+            insert_removed(a, routes, w, 1.0, 0.0, 0.3, math.inf, rng)
         before = cost_of(a, routes.sums)
         total += exchanged(problem, routes)
         assert cost_of(a, routes.sums) <= before + 1e-6

@@ -26,7 +26,9 @@ from uav_task_alloc.solver.timed.ruin import (
     insert_removed,
     list_absent,
     ruin_strings,
+    take_back,
 )
+from uav_task_alloc.solver.timed.segments import cost_of
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState
 from uav_task_alloc.study.small_problems import compare_small, small_problem
@@ -207,7 +209,7 @@ def test_neighbours_passed_over_by_their_legs_have_no_cheaper_place(returns, gra
         for t in w.removed[:w.counts[REMOVED]]:
             place, _, cost = near_place(a, routes, t, True, 0.0, rng)
             found.append((cost if place >= 0 else math.inf, cheapest_place(a, routes, t)))
-        insert_removed(a, routes, w, 1.0, 0.0, 0.0, rng)
+        insert_removed(a, routes, w, 1.0, 0.0, 0.0, math.inf, rng)
     near, least = zip(*found, strict=True)
     assert sum(map(math.isfinite, near)) > 300
     assert near == pytest.approx(least, abs=1e-6)
@@ -229,6 +231,30 @@ def test_reach_kept_during_search_is_that_of_the_legs():
                 else:
                     outer = max(outer, leg)
         assert routes.reach[t].tolist() == [inner, outer]
+
+
+@pytest.mark.parametrize('objective', ['distance', 'response', 'balanced'])
+def test_a_round_that_is_given_up_would_not_have_cost_less_than_the_limit(objective):
+    fleet, work = mixed_problem(14)
+    rules = Rules(returns=True, objective=OBJECTIVES[objective])
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony.fly(0.0, 0.5, 500)
+    a, routes, w, rng = colony.arrays, colony.routes, empty_round(colony.arrays), rng_state(1)
+    given_up = 0
+    for _ in range(200):
+        before, chance, ends = cost_of(a, routes.sums), rng.copy(), []
+        for limit in (before, math.inf):
+            rng[:] = chance
+            begin_round(routes, w)
+            ruin_strings(a, routes, w, 10.0, 10, 0.0, rng)
+            insert_removed(a, routes, w, 1.0, 0.0, 0.01, limit, rng)
+            ends.append((int(routes.counts[at.SERVED]), cost_of(a, routes.sums)))
+            if limit < math.inf or ends[-1][1] >= before:
+                take_back(a, routes, w)
+        given_up += ends[0] != ends[1]
+        assert ends[0] == ends[1] or ends[1][1] >= before - 1e-6
+    assert given_up > 50
 
 
 def selection_problem():
@@ -263,7 +289,7 @@ def test_a_round_inserts_by_value_and_chance():
         list_absent(a, routes, w)
         begin_round(routes, w)
         ruin_strings(a, routes, w, 10.0, 10, 0.0, rng)
-        insert_removed(a, routes, w, 1.0, 1.0, 0.01, rng)
+        insert_removed(a, routes, w, 1.0, 1.0, 0.01, math.inf, rng)
         keys = w.order[:w.counts[REMOVED]]
         assert (np.diff(keys) >= 0.0).all()
         ratios |= set((-keys / a.unserved[w.removed[:keys.size] - a.uavs]).tolist())

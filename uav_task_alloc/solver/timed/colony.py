@@ -25,7 +25,7 @@ DECISION = 0.02  # share of the budget after which the rounds in all are estimat
 GIVING_UP = 0.6  # share after which a search through excess ends that found nothing better
 # rounds a task from which on passing through excess pays: where durations or trips are limited,
 # and where only windows and loads are
-PRICED_ROUNDS, PRICED_WINDOW_ROUNDS = 200.0, 1000.0
+PRICED_ROUNDS, PRICED_WINDOW_ROUNDS = 200.0, 1500.0
 FRESH_ROUNDS = 15.0  # rounds a task from which on a second search from new routes pays
 # probability that a place is passed over where there are at most FEW_TASKS, not BLINK_RATE: the
 # cheapest places of all of them are soon the same in each round

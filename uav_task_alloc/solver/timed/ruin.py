@@ -26,7 +26,7 @@ from uav_task_alloc.solver.timed.insertion import (
     unlink,
 )
 from uav_task_alloc.solver.timed.places import cheapest_direction
-from uav_task_alloc.solver.timed.segments import set_reach, slot_of, update
+from uav_task_alloc.solver.timed.segments import cost_of, set_reach, slot_of, update
 from uav_task_alloc.solver.timed.ways import has_paths, is_task
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
@@ -330,13 +330,18 @@ def open_route(a: TimedArrays, r: TimedRoutes, w: Round, t: int) -> None:
 
 @inner_kernel
 def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, by_value: float,
-                   blinks: float, rng: RngState) -> None:
+                   blinks: float, limit: float, rng: RngState) -> None:
     """Insert removed tasks where each costs least. O(removed k).
 
     generous: a task is inserted where it costs less than so many times its price; by_value: share
-    of rounds that insert about the most valuable tasks first.
+    of rounds that insert about the most valuable tasks first; limit: ends where all would cost
+    that much even if the rest cost nothing.
     """
     _sort_removed(a, w, by_value, rng)
+    waiting = 0.0
+    for i in range(w.counts[REMOVED]):
+        if r.link[w.removed[i], at.OF_UAV] == a.uavs:
+            waiting += a.unserved[w.removed[i] - a.uavs]
     for i in range(w.counts[REMOVED]):
         t = w.removed[i]
         if r.link[t, at.OF_UAV] != a.uavs:
@@ -346,3 +351,6 @@ def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, by
             place, kind, cost = place_anywhere(a, r, t)
         if place >= 0 and cost < generous * a.unserved[t - a.uavs]:
             insert_saved(a, r, w, t, LINK(place), kind)
+        waiting -= a.unserved[t - a.uavs]
+        if cost_of(a, r.sums) - waiting >= limit:
+            break

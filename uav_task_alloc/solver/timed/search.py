@@ -34,6 +34,7 @@ from uav_task_alloc.solver.timed.ruin import (
     take_back,
 )
 from uav_task_alloc.solver.timed.segments import cost_of
+from uav_task_alloc.solver.timed.ways import has_paths
 
 MAX_OPENING = 64  # absent tasks that a round tries to insert that opens a route
 OPENING_RATE = 0.1  # share of rounds with absent tasks that open a route around one of them
@@ -128,6 +129,12 @@ def _update_prices(a: TimedArrays, r: TimedRoutes, w: Round, rises: Rises) -> No
         a.unserved[i] = more
 
 
+@inline_kernel
+def _limit(before: float, temperature: float, rng: RngState) -> float:
+    """The cost below which new routes are accepted, by chance. O(1)."""
+    return before - temperature * math.log(1.0 - uniform(rng))
+
+
 @kernel
 def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Rises, mean: float,
            start: float, end: float, rounds: int, rng: RngState) -> int:
@@ -136,6 +143,7 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
     A round removes about `mean` tasks.
     """
     temperature, improvements = start, 0
+    gives_up = a.visits == 0 and not has_paths(a)  # each task costs more than nothing
     decay = (end / start) ** (1.0 / max(1, rounds))
     for _ in range(rounds):
         w.counts[PATIENCE] -= 1
@@ -151,8 +159,11 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
             generous += uniform(rng)
         if opening and w.counts[REMOVED] > 0 and r.link[seed, at.OF_UAV] == a.uavs:
             open_route(a, r, w, seed)
-        insert_removed(a, r, w, generous, rises.by_value, rises.blinks, rng)
-        if cost_of(a, r.sums) < before - temperature * math.log(1.0 - uniform(rng)):
+        limit = _limit(before, temperature, rng) if gives_up else math.inf
+        insert_removed(a, r, w, generous, rises.by_value, rises.blinks, limit, rng)
+        if not gives_up:
+            limit = _limit(before, temperature, rng)
+        if cost_of(a, r.sums) < limit:
             improvements += int(record(a, r, best, rises.prizes))
         else:
             take_back(a, r, w)
