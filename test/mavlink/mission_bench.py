@@ -95,7 +95,8 @@ class UploadBench:
         self.vehicle = make_vehicle(kind, 1, capacity=capacity)
         self.peer = Peer(1)
         self.upload = Upload(self.peer, idle_after=lambda: self.profile.idle_after,
-                             rng=random.Random(seed))
+                             rng=random.Random(seed),
+                             error_when_closed=not self.profile.atomic)
         self.codecs = {'up': Codec(*OURS), 'down': Codec(1, 1)}
         self.decoders = {'up': Codec(1, 1), 'down': Codec(*OURS)}
         self.events = []

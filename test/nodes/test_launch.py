@@ -79,6 +79,7 @@ def moved(tmp_path):
     """The demo at another place, faster, with another range; it ends with HOLD, as no default."""
     text = DEMO
     for old, new in (('route_end: hold', 'speedup: 12\nroute_end: hold'),
+                     ('appears: 80', 'appears: 50'),  # long before a UAV comes there
                      ('latitude: 47.397742, longitude: 8.545594, altitude_amsl: 488.0',
                       'latitude: -33.9, longitude: 151.2, altitude_amsl: 40.0'),
                      ('position: [600, 0, 0], range: 6000', 'position: [600, 0, 0], range: 8000')):

@@ -61,6 +61,46 @@ def test_a_report_sent_before_the_mission_was_left_shows_that_it_was_flown_until
     assert list(flight.table.completed) == completed
 
 
+@pytest.mark.parametrize(('left', 'late', 'completed'), [
+    (97.0, 0.0, ['A']),  # the place by the positions on both sides of the change of mode
+    (97.0, 2.0, []),  # another station may have set the current item since
+    (90.0, 0.0, [])])
+def test_an_item_reached_just_as_the_bridge_holds_the_vehicle_is_known(left, late, completed):
+    flight = Flight(repeats=False)
+    flight.begin(A=100.0, B=500.0)
+    flight.fly_to(left)
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.table.note_other_mode(flight.now)  # by its ACK
+    flight.stay(0.2, SPEED)
+    flight.stay(0.2, 0.5 * SPEED)
+    if late:
+        flight.stay(late)
+    flight.table.note_current(1, flight.now, False, flight.frame())
+    flight.lost = True
+    flight.stay(10.0)
+    assert list(flight.table.completed) == completed
+
+
+@pytest.mark.parametrize(('seconds', 'completed'), [(10.0, ['A']), (60.0, [])])
+def test_an_item_passed_without_a_position_since_waits_for_the_next_one(seconds, completed):
+    """An ArduPilot in an EKF failsafe goes on with its mission; it has no valid position."""
+    flight = Flight(repeats=False)
+    flight.begin(A=100.0, B=150.0)
+    flight.table.note_in_mission(flight.frame())
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(85.0)
+    flight.lost = True
+    flight.stay(1.8, SPEED)  # less than a gap
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    flight.stay(min(seconds, 8.0), 5.0)
+    assert not flight.table.skipped
+    flight.stay(max(seconds - 8.0, 0.0))
+    flight.lost = False
+    flight.stay(1.0)
+    assert list(flight.table.completed) == completed
+    assert list(flight.table.skipped) == ([] if completed else ['A'])
+
+
 @pytest.mark.parametrize('repeats', [True, False])
 @pytest.mark.parametrize(('x', 'seq', 'completed'), [
     (94.0, 0, ['A']), (94.0, 1, []), (60.0, 0, [])])

@@ -84,6 +84,17 @@ def test_fault_14_each_nak_has_the_effect_of_the_table(kind, result, when):
         verified(bench, mission)
 
 
+@pytest.mark.parametrize(('kind', 'counts'), [('ardupilot', 1), ('px4', 2)])
+def test_after_all_items_an_error_of_ardupilot_is_read_back_not_sent_again(kind, counts):
+    bench = UploadBench(kind)
+    bench.line.tampers.append(drop({'MISSION_ACK'}, 1, 'down'))
+    mission = bench.replace(bench.mission())
+    assert bench.run(lambda: bench.upload.sent_all, 5.0)
+    bench.from_vehicle(ack(1))  # ArduPilot: to a late copy of an item, with no transfer open
+    verified(bench, mission)
+    assert len(bench.line.sent('MISSION_COUNT')) == counts
+
+
 @BOTH
 def test_fault_15_denied_backs_off_eight_seconds_or_more_with_jitter(kind):
     waits = set()

@@ -44,9 +44,9 @@ class OnboardMission:
 
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
                  rng: random.Random) -> None:
-        self.upload = Upload(peer, idle_after=telemetry.idle_after, rng=rng)
-        self.upload.is_superseded = self._overtaken
-        self.upload.on_difference = self._correct
+        self.upload = Upload(peer, idle_after=telemetry.idle_after, rng=rng,
+                             error_when_closed=not profile.atomic)
+        self.upload.is_superseded, self.upload.on_difference = self._overtaken, self._correct
         self.progress = ProgressTable(telemetry.frames, profile.atomic, profile.rules.loiters)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)

@@ -22,6 +22,8 @@ from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, P
 from uav_task_alloc.mavlink.mission.reached_epoch import ReachedEpoch
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 
+_AT_ONCE = 1.0  # [s] after mission mode was left in which a report shows what it did until then
+_NEXT = 0.3  # [s] until the next position, which may still be of mission mode
 _SILENT = 3.0  # [s] without a frame after which a vehicle may be lost
 
 
@@ -52,6 +54,7 @@ class CurrentItem:
         self._in_mission_at = -math.inf  # vehicle time [s] at which it was in mission mode last
         self._shown_until = -math.inf  # vehicle time [s] until which a frame has shown that
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
+        self._left_frame = 0  # number of the newest frame when that was shown
         self._flew_until: int | None = None  # number of the latest frame sent before, with an item
         # vehicle time [s] at which the current item was reported in another mode last
         self._unflown_until = -math.inf
@@ -154,6 +157,7 @@ class CurrentItem:
         path, left_at = self._positions.path, self._positions.vehicle_time(now)
         blind = left_at - path.newest > GAP
         self.in_mission, self._left_at = False, left_at if blind else path.newest
+        self._left_frame = self._frames.newest
         if blind or path.has_gap(self._in_mission_at, self._left_at):
             self._left_unseen = self._in_mission_at, self._left_at
 
@@ -321,14 +325,28 @@ class CurrentItem:
         route = tuple(item for item in epoch.items[begin:] if item.position is not None)
         until = positions.vehicle_time(now)
         if not self.in_mission:  # positions after it left mission mode prove nothing
-            left_at = self._left_at if frame is None or frame != self._flew_until else (
-                max(self._left_at, positions.sent_between(frame)[1]))
-            until = min(until, max(epoch.since, left_at))
+            until = min(until, max(epoch.since, self._flown_until(frame, until)))
         since = max(epoch.since, self._unflown_until) if in_flight else epoch.since
         self.passed.add(Claim(
             items, route, since, until, now + MAX_MESSAGE_DELAY, epoch.number,
             self._frames_of_reached(begin, end, now, frame), frame, skips, in_flight,
             first=epoch.items[begin], others_since=self._reported_until(begin)))
+
+    def _flown_until(self, frame: int | None, reported: float) -> float:
+        """Vehicle time [s] until which it may have flown what a report shows, in another mode.
+
+        Args:
+            frame: number of the report; None: not known.
+            reported: vehicle time [s] of the report.
+        """
+        left_at = self._left_at
+        if frame is not None and frame == self._flew_until:
+            return max(left_at, self._positions.sent_between(frame)[1])
+        if frame is not None and frame > self._left_frame and reported - left_at <= _AT_ONCE:
+            # it passed the item before it left: the next position may be of that moment
+            return max(left_at, min(
+                self._positions.sent_between(self._left_frame)[1], left_at + _NEXT))
+        return left_at
 
     def _reported_until(self, seq: int) -> float:
         """Vehicle time [s] until which an item was reported as current; -inf: it was not."""

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from uav_task_alloc.mavlink.mission.flown_path import CLOSE, GAP, PositionSample, Visit
+from uav_task_alloc.mavlink.mission.flown_path import CLOSE, PositionSample, Visit
 from uav_task_alloc.mavlink.mission.item import Item, leg_count
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, PositionHistory
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
@@ -111,7 +111,7 @@ class PassedItems:
         visits = {item.task: self._visit(item, claim) for item in items}
         seen = tuple(i for i in items if visits[i.task] is Visit.YES)
         rest = tuple(i for i in items if visits[i.task] is not Visit.YES)
-        blind = self._positions.path.newest < claim.until - GAP
+        blind = self._positions.path.newest < claim.until
         if rest and now < claim.deadline + _BLIND * blind:
             return _Judged(seen, ())
         self._drop(claim)

@@ -63,6 +63,7 @@ class UploadEvent(Enum):
     CANCELLED = 'ACK cancelled'
     REFUSED = 'ACK refused permanently'
     TIMEOUT = 'timeout'
+    UNSURE = 'timeout, and the mission may be stored'
     EXHAUSTED = 'no tries left'
     MATCH = 'readback matches'
     MISMATCH = 'readback differs'
@@ -80,7 +81,8 @@ TRANSITIONS: dict[UploadState, dict[UploadEvent, UploadState]] = {
     _S.COUNTING: {**_WHILE_OPEN, _E.TIMEOUT: _S.COUNTING},
     _S.SENDING: {**_WHILE_OPEN, _E.TIMEOUT: _S.READING},
     _S.CONFIRMING: {**_WHILE_OPEN, _E.TIMEOUT: _S.READING},
-    _S.GRACE: {**_WHILE_OPEN, _E.ERROR: _S.GRACE, _E.TIMEOUT: _S.BACKOFF},
+    _S.GRACE: {**_WHILE_OPEN, _E.ERROR: _S.GRACE, _E.TIMEOUT: _S.BACKOFF,
+               _E.UNSURE: _S.READING},
     _S.BACKOFF: {_E.START: _S.BACKOFF, _E.REQUEST: _S.SENDING, _E.LAST: _S.CONFIRMING,
                 _E.ACCEPTED: _S.READING, _E.TIMEOUT: _S.COUNTING, _E.EXHAUSTED: _S.IDLE},
     _S.DRAINING: {_E.START: _S.DRAINING, _E.CANCELLED: _S.COUNTING, _E.TIMEOUT: _S.COUNTING,
@@ -109,6 +111,8 @@ class Upload:
         idle_after: returns the time [s] after which the vehicle has given up a transfer.
         rng: draws the back-off times.
         same: whether items read back are those sent.
+        error_when_closed: ERROR after the last item may be the answer to a late copy of an item,
+            sent while no transfer is open, so that the mission may be stored (ArduPilot).
 
     Arguments of methods:
         mission: to be on board.
@@ -117,8 +121,10 @@ class Upload:
     """
 
     def __init__(self, peer: Peer, *, idle_after: Callable[[], float], rng: random.Random,
-                 same: Callable[[Sequence[Item], Sequence[Item]], bool] = all_alike) -> None:
+                 same: Callable[[Sequence[Item], Sequence[Item]], bool] = all_alike,
+                 error_when_closed: bool = False) -> None:
         self._peer, self._idle_after, self._rng, self._same = peer, idle_after, rng, same
+        self._error_when_closed = error_when_closed
         self.state = UploadState.IDLE
         self.events: deque[Outcome] = deque()
         self.uploads = 0  # started so far
@@ -206,7 +212,9 @@ class Upload:
             self._out += self._readback.step(now)
             self._judge_readback(now)
         elif self.busy and now >= self._due:
-            self._go(UploadEvent.TIMEOUT, now)
+            unsure = (self.state is UploadState.GRACE and self._sent_last
+                      and self._error_when_closed)
+            self._go(UploadEvent.UNSURE if unsure else UploadEvent.TIMEOUT, now)
         return self._flush()
 
     def _flush(self) -> list[Message]:
