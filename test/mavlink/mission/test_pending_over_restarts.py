@@ -3,7 +3,7 @@
 import pytest
 from authority_bench import ARDUPILOT, BOTH, MODES, L, flying
 from evidence_bench import Flight
-from findings_bench import distance, drop_messages, flown_once_each, listed
+from findings_bench import distance, drop_messages, flown_once_each, listed, truthful
 from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -108,3 +108,28 @@ def test_what_was_passed_before_the_mission_was_read_is_of_no_mission_that_repla
     bench.run(limit=20.0)
     assert bench.onboard().held
     assert bench.completed() == ['A', 'B']
+
+
+@ARDUPILOT
+def test_a_mission_stored_in_a_hold_is_not_flown_up_to_the_item_of_the_mission_before(kind):
+    """The bridge is killed without a file between the upload and the set of the current item."""
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: places(bench) == ['A', 'B'], 200.0)
+    bench.run(limit=2.0)
+    for message in ('COMMAND_LONG', 'MISSION_SET_CURRENT'):
+        drop_messages(bench, 'up', message, lambda m: m.get_type() == 'MISSION_SET_CURRENT' or (
+            m.command == d.MAV_CMD_DO_SET_MISSION_CURRENT))
+    bench.assign(task_list('DEF', 2))
+    assert bench.run(lambda: bench.onboard().set_current_to is not None, 30.0)
+    drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: True)
+    bench.kill_and_restart(0.0, store=False)
+    bench.assign(task_list('DEF', 2))
+    bench.run(limit=4.0)
+    drop_messages(bench, 'up', 'COMMAND_LONG', lambda m: True)
+    bench.vehicles[1].rc_mode(MODES[kind].mission)
+    bench.run(limit=2.0)
+    del bench.line.tampers[2]  # of MISSION_COUNT
+    bench.run(limit=3.0)
+    bench.line.tampers.clear()
+    assert bench.completed() == []
+    assert truthful(bench, lambda: sorted(bench.completed()) == ['D', 'E', 'F'])

@@ -174,7 +174,9 @@ class Resume:
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
             self._credit(held[recorded:recorded + 1], now)
-        if self.current_unreliable or (self.was_disarmed and not telemetry.airborne) or (
+        held_since_start = self.recorded[0] is None and self._unread.began_held
+        if self.current_unreliable or held_since_start or (
+                self.was_disarmed and not telemetry.airborne) or (
                 not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION
                 and (replaced or not self._continues_recorded(held))):
             self._begin_nowhere(held, now)
@@ -188,8 +190,7 @@ class Resume:
             self._continue_recorded(held, tasks, ended, now)
             return
         self._credit_unread(held, now)
-        flown = len(held) if ended else current
-        currents = self._unread.currents
+        flown, currents = len(held) if ended else current, self._unread.currents
         first = min(currents[0].seq, flown) if currents else flown
         self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
         items = held[:flown] + self._tasks.tagged(held[flown:], tasks)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from copy import deepcopy
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.autopilots import ModeFunction
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.passed_items import flown_between
@@ -32,6 +33,7 @@ class UnreadCurrent(NamedTuple):
     flying: bool  # in mission mode, so that it is of the mission that is flown
     complete: bool  # with the report that the mission is flown to its end
     total: int | None = None  # items of the mission that it reported to fly; None: it did not
+    holding: bool = False  # in the mode in which the bridge has it wait, as for an upload
 
 
 @dataclass(slots=True)
@@ -99,7 +101,8 @@ class UnreadReports:
         if not located and len(self.currents) < _MAX_CURRENTS:
             self.currents.append(UnreadCurrent(
                 seq, now, frame, self._telemetry.in_mission,
-                self._telemetry.mission_state == d.MISSION_STATE_COMPLETE, self._count_flown()))
+                self._telemetry.mission_state == d.MISSION_STATE_COMPLETE, self._count_flown(),
+                self._telemetry.mode is ModeFunction.HOLD))
         for reached in self._reached:
             if frame > reached.frame:
                 reached.current_after = max(seq, reached.current_after or 0)
@@ -184,6 +187,15 @@ class UnreadReports:
         """
         return _passed(self.currents, self._positions, held, home, while_current)
 
+    @property
+    def began_held(self) -> bool:
+        """Whether it waited where the bridge has it wait, as for an upload, before it flew.
+
+        An ArduPilot keeps the current item when its mission is replaced.
+        """
+        before = takewhile(lambda each: not each.flying, self.currents)
+        return not self._repeats and any(each.holding for each in before)
+
     def flown_first(self, count: int) -> int:
         """Return the item that a mission of so many items was flying when this run began.
 
@@ -192,9 +204,11 @@ class UnreadReports:
 
         Returns:
             Its index; 0: not known. A report that was sent before the first frame of this run may
-            be of a mission that was replaced since.
+            be of a mission that was replaced since, as may what follows a hold.
         """
         first = self._telemetry.frames.first
+        if self.began_held:
+            return 0
         return next((each.seq for each in self.currents
                      if each.total == count and each.frame > first), 0)
 
