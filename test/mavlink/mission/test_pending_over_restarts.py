@@ -133,3 +133,24 @@ def test_a_mission_stored_in_a_hold_is_not_flown_up_to_the_item_of_the_mission_b
     bench.line.tampers.clear()
     assert bench.completed() == []
     assert truthful(bench, lambda: sorted(bench.completed()) == ['D', 'E', 'F'])
+
+
+@ARDUPILOT
+@pytest.mark.parametrize('skipped', [False, True])
+def test_a_task_flown_before_the_first_position_of_a_bridge_without_a_file_is_known(kind, skipped):
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: distance(bench, AT_A) < 60.0, 60.0)
+    for message in ('GLOBAL_POSITION_INT', 'MISSION_COUNT', 'MISSION_ITEM_REACHED'):
+        drop_messages(bench, 'down', message, lambda m: True)
+    bench.kill_and_restart(0.0, store=False)
+    bench.assign(task_list('ABC', 2))
+    bench.run(limit=2.0)
+    if skipped:
+        bench.from_station(d.MAVLink_mission_set_current_message(1, 1, 2))
+    assert skipped or bench.run(lambda: places(bench) == ['A'], 20.0)
+    bench.run(limit=6.0)
+    bench.line.tampers.clear()
+    assert bench.run(lambda: bench.onboard().resume.located, 20.0)
+    bench.run(limit=0.2)
+    assert ('A' in bench.completed()) is not skipped
+    flown_once_each(bench, 'ABC')

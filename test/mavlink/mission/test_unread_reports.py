@@ -6,6 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as d
 from test_findings_kills import items_at
 
+from uav_task_alloc.mavlink.autopilots import ModeFunction
 from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReports
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
@@ -15,7 +16,8 @@ from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 def reports_of(place, repeats):
     """Reports of a vehicle in mission mode that stands at a place."""
     telemetry = SimpleNamespace(has_position=True, position=place, speed=0.0, in_mission=True,
-                                mission_state=d.MISSION_STATE_ACTIVE, total=3)
+                                mission_state=d.MISSION_STATE_ACTIVE, total=3,
+                                mode=ModeFunction.MISSION)
     history = PositionHistory()
     history.add(PositionSample(1.0, place, (0.0, 0.0, 0.0)), True, 1.0, 1)
     return UnreadReports(telemetry, history, repeats)

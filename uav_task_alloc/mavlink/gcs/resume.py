@@ -171,13 +171,13 @@ class Resume:
             return
         self._begin(held, now)
         replaced = self._find_upload(held)
-        mission, recorded, _ = self.recorded
-        if self._passed_recorded and mission == checksum(held) and recorded is not None:
-            self._credit(held[recorded:recorded + 1], now)
-        held_since_start = self.recorded[0] is None and self._unread.began_held
-        if self.current_unreliable or held_since_start or (
-                self.was_disarmed and not telemetry.airborne) or (
-                not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION
+        mission, n, _ = self.recorded
+        if self._passed_recorded and mission == checksum(held) and n is not None:
+            self._credit(held[n:n + 1], now)
+        held_first = self.recorded[0] is None and self._unread.began_held
+        if self.current_unreliable or held_first or (
+                self.was_disarmed and not telemetry.airborne) or (not self._profile.atomic
+                and telemetry.mode is not ModeFunction.MISSION
                 and (replaced or not self._continues_recorded(held))):
             self._begin_nowhere(held, now)
             return
@@ -197,8 +197,7 @@ class Resume:
         self._progress.begin(items, flown, now, read=True)
         self._epoch, self._located_at = self._progress.epoch, flown
         # the previous run has reported earlier items, or recorded that they were skipped
-        same = self.recorded[0] == checksum(held)
-        self._old = held[:self.recorded[1] or 0] if same else ()
+        self._old = held[:self.recorded[1] or 0] if self.recorded[0] == checksum(held) else ()
         # on the ground with the first list: the onboard mission is of an earlier flight
         if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
             self._until = now + MAX_AGE
@@ -282,8 +281,9 @@ class Resume:
         if begin == end or not self._unread.currents:
             return set()
         frame = max(each.frame for each in self._unread.currents if each.at <= now)
-        return flown_between(self._placed(held), begin, end, now, frame,
-                             self._progress.positions, self._home_of(held), left_unseen)
+        placed, home = self._placed(held), self._home_of(held)
+        return self._unread.passed_unseen(placed) | flown_between(
+            placed, begin, end, now, frame, self._progress.positions, home, left_unseen)
 
     def _replay(self, held: tuple[Item, ...], now: float) -> None:
         """Pass on what was received until the mission was read, in the order it was sent."""

@@ -187,6 +187,23 @@ class UnreadReports:
         """
         return _passed(self.currents, self._positions, held, home, while_current)
 
+    def passed_unseen(self, held: tuple[Item, ...]) -> set[int]:
+        """Return the items passed in mission mode before any position, by the first position.
+
+        It is on the leg after such an item, of a vehicle that flies it.
+
+        Args:
+            held: see `passed`.
+        """
+        positions, path = self._positions, self._positions.path
+        if not path.samples:
+            return set()
+        return {before.seq for before, then in pairwise(each for each in self.currents
+                                                        if each.flying)
+                if then.seq == before.seq + 1 < len(held)
+                and positions.vehicle_time(then.at) <= path.samples[0].t
+                and path.begins_on_leg(held[before.seq].position, held[then.seq].position)}
+
     @property
     def began_held(self) -> bool:
         """Whether it waited where the bridge has it wait, as for an upload, before it flew.

@@ -28,6 +28,7 @@ _FEW, _USUAL_SPEED = 100, 15.0  # samples; [m/s] assumed where there are fewer
 _ACCELERATION = 6.0  # [m/s2] that no vehicle exceeds for seconds (PX4: MPC_ACC_HOR_MAX 5)
 _CORRIDOR = 8.0  # [m] from a leg at which a vehicle flies it
 _INSIDE = 2.5  # [m] from a leg on the inner side of the turn before it, where it cuts the corner
+_STRAIGHT = 2.5  # [m] from a leg, and from its start by the course, where it came from there
 _LEG_END = 10.0  # [m] from the ends of a leg where a vehicle may be at any speed
 _TURN = 5.0  # [m] of the next leg within which a vehicle that has come to its start turns
 _LEAST_ACCELERATION = 1.0  # [m/s2] with which a vehicle sets out on a leg, and ends it
@@ -190,6 +191,26 @@ class FlownPath:
                     and not _turned_on_leg(b, c, chain[-1], then))))):
                 return True
         return False
+
+    def begins_on_leg(self, start: Point | None, then: Point | None) -> bool:
+        """Whether the first sample is of a vehicle that came straight from a point.
+
+        Args:
+            start: from which it would have come, ENU [m]; None: not known.
+            then: to which it would fly on, ENU [m]; None: not known.
+        """
+        if not self._samples or start is None or then is None:
+            return False
+        first, after = self._samples[0], self._samples[1] if len(self._samples) > 1 else None
+        speed, flown = math.hypot(*first.velocity), math.dist(first.position, start)
+        if not speed > _HOLD_SPEED:
+            return False
+        x, y, z = (p - flown * v / speed for p, v in zip(
+            first.position, first.velocity, strict=True))
+        return (math.dist((x, y, z), start) <= _STRAIGHT
+                and segment_distance(first.position, start, then) <= _STRAIGHT
+                and _moves_along(first, start, then, self.fastest)
+                and not _turned_on_leg(first, after, start, then))
 
     @property
     def fastest(self) -> float:
