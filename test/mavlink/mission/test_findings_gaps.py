@@ -159,3 +159,18 @@ def test_a_position_of_before_a_reboot_that_comes_after_it_is_dropped(kind):
     bench.from_vehicle(late)
     bench.run(limit=1.0)
     assert bench.onboard().progress.path.newest < 10.0
+
+
+def test_a_position_that_comes_after_the_mode_of_a_restart_hides_no_place_of_before():
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0)
+    flight.table.note_in_mission(flight.frame())
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(100.0)
+    flight.table.note_in_mission(flight.frame())
+    late = PositionSample(flight.now + 0.2, (100.0, 0.0, 50.0), (0.0, 0.0, 0.0))
+    flight.now += 1.0
+    flight.table.note_mission_left(flight.now)  # by a heartbeat of after the restart
+    flight.table.add_position(late, True, flight.now, flight.frame())
+    flight.table.invalidate()
+    assert list(flight.table.completed) == ['A']

@@ -8,6 +8,8 @@ from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.autopilots import ModeFunction
+
 AT_A = (0.0, 100.0, 50.0)
 
 
@@ -153,4 +155,44 @@ def test_a_task_flown_before_the_first_position_of_a_bridge_without_a_file_is_kn
     assert bench.run(lambda: bench.onboard().resume.located, 20.0)
     bench.run(limit=0.2)
     assert ('A' in bench.completed()) is not skipped
+    flown_once_each(bench, 'ABC')
+
+
+@BOTH
+def test_a_current_item_beyond_the_mission_that_is_read_after_a_restart_is_no_error(kind):
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: distance(bench, AT_A) < 60.0, 60.0)
+    for message in ('MISSION_CURRENT', 'MISSION_COUNT'):
+        drop_messages(bench, 'down', message, lambda m: True)
+    bench.kill_and_restart(0.0)
+    bench.assign(task_list('ABC', 2))
+    bench.run(limit=1.0)
+    bench.from_vehicle(d.MAVLink_mission_current_message(9, 3, d.MISSION_STATE_ACTIVE, 1))
+    bench.line.tampers.pop()
+    assert bench.run(lambda: bench.onboard().resume.located, 20.0)
+    bench.line.tampers.clear()
+    flown_once_each(bench, 'ABC')
+    assert not bench.ground_station.refusals.notes
+
+
+@ARDUPILOT
+def test_the_current_item_is_set_after_a_hold_once_it_was_reported(kind):
+    """An item that was reached in the moment of the hold is not flown again."""
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: distance(bench, AT_A) < 60.0, 60.0)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    bench.run(limit=3.0)
+    drop_messages(bench, 'down', 'MISSION_CURRENT', lambda m: True)
+    bench.hand_over()
+    assert bench.run(lambda: bench.executor().telemetry.mode is ModeFunction.HOLD, 10.0)
+    held_at = bench.now
+
+    def sets():
+        return [m for t, way, m in bench.line.log if t > held_at and way == 'up' and (
+            m.get_type() == 'COMMAND_LONG' and m.command == d.MAV_CMD_DO_SET_MISSION_CURRENT)]
+    bench.run(limit=1.4)
+    assert not sets()
+    bench.run(limit=1.6)  # it may not be reported at all
+    assert sets()
+    bench.line.tampers.clear()
     flown_once_each(bench, 'ABC')

@@ -18,6 +18,8 @@ from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 
+_REPORT_DELAY = 2.0  # [s] after a change of mode in which the current item is reported, as a rule
+
 
 class ListExecution:
     """Updates the onboard mission to the list, and flies it."""
@@ -134,6 +136,10 @@ class ListExecution:
         if onboard.set_current_to is None and not (
                 flying or self._current_set or self._profile.atomic):
             # ArduPilot resumes after the item that it flew last
+            telemetry = self._telemetry
+            if telemetry.airborne and telemetry.current_at <= telemetry.mode_at and (
+                    now - telemetry.mode_at < _REPORT_DELAY):
+                return sender.wait_for('the current item since the hold')
             onboard.set_current_to = onboard.progress.current
         if onboard.set_current_to is not None:
             return self._set_current(

@@ -171,11 +171,9 @@ class Resume:
             return
         self._begin(held, now)
         replaced = self._find_upload(held)
-        mission, n, _ = self.recorded
-        if self._passed_recorded and mission == checksum(held) and n is not None:
-            self._credit(held[n:n + 1], now)
-        held_first = self.recorded[0] is None and self._unread.began_held
-        if self.current_unreliable or held_first or (
+        if self._passed_recorded and self.recorded[0] == checksum(held):
+            self._credit(held[self.recorded[1] or 0:][:1], now)
+        if self.current_unreliable or (
                 self.was_disarmed and not telemetry.airborne) or (not self._profile.atomic
                 and telemetry.mode is not ModeFunction.MISSION
                 and (replaced or not self._continues_recorded(held))):
@@ -192,6 +190,8 @@ class Resume:
         self._credit_unread(held, now)
         flown, currents = len(held) if ended else current, self._unread.currents
         first = min(currents[0].seq, flown) if currents else flown
+        if self._unread.began_held and self.recorded[0] is None:
+            first = 0  # what was before it may be of the mission before
         self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
         items = held[:flown] + self._tasks.tagged(held[flown:], tasks)
         self._progress.begin(items, flown, now, read=True)
@@ -257,7 +257,7 @@ class Resume:
         _, recorded, arrived = self.recorded
         assert recorded is not None
         progress, first = self._progress, self._unread.currents[0]
-        current, when = first.seq, first.at
+        current, when = min(first.seq, len(held)), first.at
         if ended:
             current, when = len(held), now
         self._old, self._until = held[:recorded], now + MAX_AGE

@@ -70,7 +70,7 @@ class Telemetry:
         self.altitude = math.nan  # [m] AMSL
         self.battery = math.nan  # 0..1, of the battery with least remaining
         self.armed = False
-        self.mode = ModeFunction.UNKNOWN
+        self.mode, self.mode_at = ModeFunction.UNKNOWN, -math.inf  # it was set then [s]
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
         self.unhealthy = ''  # text on failing prearm checks; '': none reported
@@ -196,7 +196,12 @@ class Telemetry:
 
     def note_acknowledged(self, mode: ModeFunction) -> None:
         """Take a mode that the vehicle has acknowledged; its heartbeats may be older."""
-        self.mode, self._mode_frame = mode, self.frames.newest
+        self._set_mode(mode, self.received_at)
+        self._mode_frame = self.frames.newest
+
+    def _set_mode(self, mode: ModeFunction, now: float) -> None:
+        if mode is not self.mode:
+            self.mode, self.mode_at = mode, now
 
     def is_of_before_restart(self, message: Message, now: float) -> bool:
         """Whether a message was sent before a restart of the vehicle, and comes after it."""
@@ -261,7 +266,7 @@ class Telemetry:
 
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
-        self.mode = self._profile.mode_function(message.custom_mode)
+        self._set_mode(self._profile.mode_function(message.custom_mode), now)
         self._mode_frame = self.frame
         self._landed(self.landed)
         if self.mode is ModeFunction.MISSION:

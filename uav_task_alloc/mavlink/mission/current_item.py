@@ -54,6 +54,7 @@ class CurrentItem:
         self._in_mission_at = -math.inf  # vehicle time [s] at which it was in mission mode last
         self._shown_until = -math.inf  # vehicle time [s] until which a frame has shown that
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
+        self._left_seen = -math.inf  # vehicle time [s] at which a message has shown that
         self._left_frame = 0  # number of the newest frame when that was shown
         self._flew_until: int | None = None  # number of the latest frame sent before, with an item
         # vehicle time [s] at which the current item was reported in another mode last
@@ -97,7 +98,7 @@ class CurrentItem:
         The mode and the current item of a restarted vehicle may come before its clock shows it.
         """
         epoch, back = self._epoch, self.set_back_from
-        if not self.in_mission and self._left_at != self._positions.path.newest:
+        if not self.in_mission and self._positions.path.newest > self._left_seen:
             return None
         if back is not None and now - back[1] < MAX_MESSAGE_DELAY and back[0] < len(epoch.items):
             return epoch.items[back[0]]
@@ -157,7 +158,7 @@ class CurrentItem:
         path, left_at = self._positions.path, self._positions.vehicle_time(now)
         blind = left_at - path.newest > GAP
         self.in_mission, self._left_at = False, left_at if blind else path.newest
-        self._left_frame = self._frames.newest
+        self._left_frame, self._left_seen = self._frames.newest, max(left_at, path.newest)
         if blind or path.has_gap(self._in_mission_at, self._left_at):
             self._left_unseen = self._in_mission_at, self._left_at
 
