@@ -136,9 +136,7 @@ class ListExecution:
         if onboard.set_current_to is None and not (
                 flying or self._current_set or self._profile.atomic):
             # ArduPilot resumes after the item that it flew last
-            telemetry = self._telemetry
-            if telemetry.airborne and telemetry.current_at <= telemetry.mode_at and (
-                    now - telemetry.mode_at < _REPORT_DELAY):
+            if self._current_unreported(now):
                 return sender.wait_for('the current item since the hold')
             onboard.set_current_to = onboard.progress.current
         if onboard.set_current_to is not None:
@@ -146,6 +144,12 @@ class ListExecution:
                 MissionDiff(DiffKind.JUMP, onboard.progress.items, onboard.set_current_to), now
             )
         return sender.set_mode(ModeFunction.MISSION, now)
+
+    def _current_unreported(self, now: float) -> bool:
+        """Whether no current item came since the mode has just changed in the air."""
+        telemetry = self._telemetry
+        return telemetry.airborne and telemetry.current_at <= telemetry.mode_at and (
+            now - telemetry.mode_at < _REPORT_DELAY)
 
     def _set_back_late(self, now: float) -> bool:
         """Whether a command of ours that a link delayed has set back the current item.
