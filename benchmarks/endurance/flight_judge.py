@@ -24,6 +24,7 @@ LEFT = 15.0  # [m] from a task: it has left
 STUCK = 60.0  # [s]
 PASSED = 1.5  # [s] around a set-current by another: what it crosses then may have been flown
 BEAT = 1.0  # [s] between heartbeats: a shorter mode is not reported
+SHOWN = 2.5  # [s] in which the link shows a mode: later it has changed in a cut
 DOUBT = 5.0  # [s] in which a change of mode on the ground may still turn out to be a restart
 
 
@@ -51,6 +52,11 @@ class Judge:
     others let it fly again until then, such as a complete mission that begins again where a pilot
     sets mission mode, is no fault of the bridge: `flown_again_killed` counts it apart. A mode
     that is set meanwhile hands nothing back, so that a command of the bridge is `overridden`.
+
+    A complete mission begins again at its first item where a pilot sets mission mode. What it
+    flies again before the bridge may command it is counted apart, too, as
+    `flown_again_for_pilot`: a failsafe is active, or the link was cut when the mode was set, so
+    that by the table it is not handed over.
     """
 
     def __init__(self, world: World, kind: str, places: dict[str, tuple[float, float, float]],
@@ -83,6 +89,9 @@ class Judge:
         self._crossed: set[str] = set()  # tasks whose places it crossed at such a moment
         self._evidence = DeliveredEvidence(self.family == 'px4')
         self._at = ''  # the task that it has reached, until it leaves: one visit
+        self._ended = False  # its mission, and it was not begun again
+        self._begun_again = math.inf  # [s] another has, and the bridge has commanded nothing since
+        self._unheld = False  # no heartbeat has shown that in time without a failsafe
         self._avoids = False  # its autopilot avoids other traffic
         self._stuck_since = self._moved_at = 0.0
         self._listed = world.tasks  # a new list begins a new transfer
@@ -126,6 +135,8 @@ class Judge:
                 self._boot_over |= message.system_status >= d.MAV_STATE_STANDBY
                 self._killed |= sent > self._handed_at and (
                     message.system_status > d.MAV_STATE_CRITICAL)
+                if sent > self._begun_again and self.world.now < self._begun_again + SHOWN:
+                    self._unheld &= self.failing
         if self.world.now - self._set_at < PASSED:
             self._crossed.update(name for name, place in self.places.items() if math.dist(
                 place, self.world.vehicle.flight.body.position) < NEAR)
@@ -154,6 +165,7 @@ class Judge:
             self._item_reached(event)
         elif event.name == 'mode' and event.mode is not None:
             before, self._mode = self._mode, event.mode
+            self._note_begun(event)
             if event.t - self._mode_at >= BEAT:
                 self._shown = before
             before, self._mode_at = self._shown, event.t
@@ -179,6 +191,10 @@ class Judge:
         elif event.name == 'command' and event.command == 'set current' and event.cause != OURS:
             self._set_at = event.t
             self._evidence.set_by_other(event.t)
+        elif event.name == 'mission_end':
+            self._ended = True
+        elif event.name == 'command' and event.cause == OURS:
+            self._ended, self._begun_again = False, math.inf
         elif event.name == 'armed':
             self._armed = True
             if self._taken_by_disarm and self.known_at is None:
@@ -187,6 +203,12 @@ class Judge:
             self.failing = True
         elif event.name == 'failsafe_over':
             self.failing = False
+
+    def _note_begun(self, event: TruthEvent) -> None:
+        """Note a mode that begins a complete mission again, by another than the bridge."""
+        if self._ended and event.cause not in (OURS, 'self') and event.mode is not None and (
+                self._class(event.mode) is ModeClass.MISSION):
+            self._ended, self._begun_again, self._unheld = False, event.t, True
 
     def _item_reached(self, event: TruthEvent) -> None:
         assert event.seq is not None
@@ -200,6 +222,9 @@ class Judge:
             if self.reached[name] == 2 and self._killed:
                 self.counts['flown_again_killed'] += 1
                 self.notes.append(f'{event.t:.1f} {name} reached again: killed, not handed back')
+            elif self.reached[name] == 2 and self._unheld and event.t > self._begun_again:
+                self.counts['flown_again_for_pilot'] += 1
+                self.notes.append(f'{event.t:.1f} {name} reached again: for a pilot')
             elif self.reached[name] == 2 and name in self._evidence.known:
                 self._fault('flown_twice', f'{name} reached again')
             elif self.reached[name] == 2:

@@ -9,8 +9,9 @@ of the simulator and the link. `flyable` counts the tasks of flights at whose en
 controls the aircraft, `completed` those of them that it reported. `flown_twice` counts the tasks
 flown again though a frame was delivered that shows that they were flown (see `flight_evidence`);
 `flown_again_unknowable` those of which no such frame was delivered; `flown_again_killed` those
-that others let a killed vehicle fly again before it was handed back. --ways 0.5 gives half of the
-tasks a way: reported without having been flown from end to end it is `false_completed`;
+that others let a killed vehicle fly again before it was handed back, `flown_again_for_pilot`
+those of a complete mission that another began again (see `flight_judge`). --ways 0.5 gives half
+of the tasks a way: reported without having been flown from end to end it is `false_completed`;
 `way_points_again` counts points of ways that were flown again, as after a doubt. `errors` are
 those that the bridge has caught, with which it has dropped a message or a list.
 --without-authority disables the table, to show that the check can fail. --json: the last line is
@@ -338,7 +339,7 @@ def main() -> int:
     print(file=sys.stderr)
     names = ('flights', 'takeovers', 'failsafes', 'reboots', 'restarts', 'handed_back',
              'completed', 'flyable', *WRONG, 'errors', 'flown_again_unknowable',
-             'flown_again_killed')
+             'flown_again_killed', 'flown_again_for_pilot')
     result = {name: total[name] for name in (*names, *sorted(set(total) - set(names)))}
     result |= {'seed': args.seed, 'lossy': args.lossy}
     for name, value in result.items():

@@ -287,6 +287,26 @@ def test_what_a_pilot_lets_a_killed_vehicle_fly_again_is_counted_apart(kill, cou
     assert counts['flown_twice'] + counts['flown_again_killed'] == 1
 
 
+@pytest.mark.parametrize(('failsafe', 'shown', 'commanded', 'counted'), [
+    (False, True, False, 'flown_twice'),  # the bridge has it, and could have held it
+    (False, False, False, 'flown_again_for_pilot'),  # the link was cut
+    (True, True, False, 'flown_again_for_pilot'),
+    (False, False, True, 'flown_twice')])
+def test_a_complete_mission_that_a_pilot_begins_again_is_flown_for_him_until_it_is_held(
+        failsafe, shown, commanded, counted):
+    counts = judged([
+        (1.0, [('armed', OURS, None), ('item_reached', 'A', None)], heartbeat(True), None),
+        (1.1, [('mission_end', '', None)], d.MAVLink_mission_item_reached_message(0), None),
+        (2.0, [('item_reached', 'B', None)], None, None),
+        (3.0, [('mode', 'pilot', px4_mode(4, 4))], None, None),
+        (3.5, [('failsafe', 'battery', None)] if failsafe else [], None, None),
+        (4.0, [], heartbeat(True) if shown else None, None),
+        (7.0, [('command', OURS, None)] if commanded else [], heartbeat(True), None),
+        (9.0, [('item_reached', 'A', None)], None, None)])
+    assert counts[counted] == 1
+    assert counts['flown_twice'] + counts['flown_again_for_pilot'] == 1
+
+
 @pytest.mark.parametrize(('late', 'overridden'), [(2.0, False), (0.5, True)])
 def test_a_heartbeat_of_before_a_hand_over_by_the_service_shows_no_kill_after_it(late, overridden):
     killed = heartbeat(False, d.MAV_STATE_FLIGHT_TERMINATION)

@@ -80,3 +80,13 @@ def test_a_task_reached_without_a_position_just_before_a_reboot_is_known_by_the_
     reports.note_current(0, 3.5, 4, located=False)
     taken = reports.take_reached(items_at(0.0, 100.0, 200.0), 1, 4.0)
     assert [each.seq for each in taken] == [1] * known
+
+
+@pytest.mark.parametrize(('x', 'known'), [(200.0, True), (150.0, False)])
+def test_the_last_item_of_a_px4_is_known_though_a_pilot_begins_the_mission_again(x, known):
+    reports = reports_of((x, 0.0, 50.0), repeats=True)
+    reports.note_current(2, 1.0, 1, located=False)
+    reports.note_reached(2, 1.2, 2)
+    reports.note_current(0, 9.0, 3, located=False)
+    taken = reports.take_reached(items_at(0.0, 100.0, 200.0), 2, 12.0)
+    assert [each.seq for each in taken] == [2] * known

@@ -274,7 +274,9 @@ class UnreadReports:
     def _is_of(self, reached: UnreadReached, held: tuple[Item, ...]) -> bool:
         """Whether a REACHED can be of the mission on board, by the current item and the place."""
         before = [each.seq for each in self.currents if each.frame < reached.frame][-1:]
-        if self._repeats and reached.current_after is None and before == [len(held) - 1]:
+        after = reached.current_after
+        if self._repeats and before == [len(held) - 1] == [reached.seq] and (
+                after is None or after < reached.seq):  # it may begin again
             reached.current_after = before[0]  # no item follows the last one
         if not reached.may_be_of(held, self._repeats):
             return False
