@@ -50,7 +50,9 @@ class DeliveredEvidence:
     Evidence is MISSION_ITEM_REACHED of that visit, MISSION_CURRENT past its item (or COMPLETE) of
     the same items, or positions at the place while its item was current, for its service time,
     and a frame sent after them that shows mission mode: without one a pilot may have taken the
-    vehicle just before it was there.
+    vehicle just before it was there. One of after a restart of the vehicle shows nothing.
+    A REACHED of a mission that was replaced before a bridge without a file began is none: nothing
+    names the task of its index to that.
     A MISSION_CURRENT sent after another station has set the current item is none: it would be the
     same if the item had been skipped just before it was reached. Nor is COMPLETE of a PX4 once it
     was in Takeoff or Land: these modes report their own end as that of the mission
@@ -64,11 +66,14 @@ class DeliveredEvidence:
         self._px4 = px4
         self.known: dict[str, float] = {}  # tasks with evidence, and when [s] it was complete
         self._now = 0.0  # [s] of the tick
+        # on board when a bridge without a file began; None: none has
+        self._found: tuple[StoredItem, ...] | None = None
         self._held_from = -math.inf  # [s] visits before it need a current item in mission mode
         self._visits: dict[str, _Visit] = {}
         self._states: dict[int, _State] = {}  # by tick
         self._positions: list[float] = []  # [s] when each delivered position was sent
-        self._shown = -math.inf  # [s] the latest delivered frame that shows mission mode was sent
+        # [s] the latest delivered frame that shows mission mode was sent, by the boot time [s]
+        self._shown: dict[float, float] = {}
 
     def add_state(self, now: float, flight: VehicleFlight) -> None:
         """Record the vehicle as the frames of this tick show it."""
@@ -90,6 +95,8 @@ class DeliveredEvidence:
         """
         self.known = {task: at for task, at in self.known.items() if self._now - at > JUDGED}
         self._positions.clear()
+        state = self._states.get(_tick(self._now))
+        self._found = () if state is None else state.items
         if not self._px4:
             self._held_from = self._now
 
@@ -125,8 +132,8 @@ class DeliveredEvidence:
         """
         kind, state = message.get_type(), self._states.get(_tick(sent))
         if kind in ('HEARTBEAT', 'MISSION_CURRENT') and state is not None and (
-                state.seq is not None and sent > self._shown):
-            self._shown = sent
+                state.seq is not None and sent > self._shown.get(state.booted, -math.inf)):
+            self._shown[state.booted] = sent
             self._judge_positions()
         if kind == 'GLOBAL_POSITION_INT' and (message.lat, message.lon) != (0, 0):
             self._positions = [t for t in self._positions if t > sent - KEPT] + [sent]
@@ -138,9 +145,10 @@ class DeliveredEvidence:
                     self.known[task] = self._now
 
     def _shows(self, visit: _Visit, sent: float, message: Message) -> bool:
-        if message.get_type() == 'MISSION_ITEM_REACHED':
-            return bool(message.seq == visit.seq) and sent < visit.next_at
         state, end = self._states.get(_tick(sent)), visit.seq + 1
+        if message.get_type() == 'MISSION_ITEM_REACHED':
+            return bool(message.seq == visit.seq) and sent < visit.next_at and (
+                self._found is None or self._found[:end] == visit.state.items[:end])
         if sent > visit.set_at:
             return False
         if state is not None and state.seq is None and visit.at < self._held_from:
@@ -155,8 +163,9 @@ class DeliveredEvidence:
         for task, visit in self._visits.items():
             if task in self.known:
                 continue
+            shown = self._shown.get(visit.state.booted, -math.inf)
             times = [t for t in self._positions
-                     if t <= min(visit.at + TICK, self._shown) and self._at(visit, t)]
+                     if t <= min(visit.at + TICK, shown) and self._at(visit, t)]
             if times and max(times) - min(times) >= visit.hold - SAMPLED:
                 self.known[task] = self._now
 
