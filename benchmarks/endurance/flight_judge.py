@@ -74,8 +74,9 @@ class Judge:
         self.completed: set[str] = set()
         self._mode = self._shown = world.vehicle.flight.custom_mode
         self._mode_at = -math.inf  # [s]
-        self._armed = False  # ever
+        self._armed = False  # since the last grant, as the table counts it
         self._boot_over = False  # a frame was delivered that shows the end of its boot
+        self._rebooted_at = -math.inf  # [s]; what a beat later was sent is surely of after it
         self._commanded: dict[int, float] = {}  # modes commanded by the bridge, at [s]
         self._commanded_arm, self._taken_by_arm = -math.inf, False
         self._armed_at, self._shown_armed = -math.inf, False  # [s]; by a delivered frame since
@@ -103,12 +104,14 @@ class Judge:
         self.taken_at = self.known_at = None
         self.stubborn = self._killed = False
         if by_service:
-            self._handed_at = self.world.now
+            self._handed_at, self._armed = self.world.now, self.world.vehicle.flight.armed
         self.counts['handed_back'] += 1
 
     def rebooted(self) -> None:
-        """Note a reboot: on the ground; an aircraft never armed is taken by no one."""
+        """Note a reboot: on the ground; an aircraft not armed since the grant is taken by no one.
+        """
         self.failing = self._boot_over = False
+        self._rebooted_at = self.world.now
         if not self._armed and (self.known_at is None or self.world.now - self.known_at < DOUBT):
             self.taken_at = self.known_at = None
 
@@ -132,7 +135,8 @@ class Judge:
             self._evidence.delivered(sent, message)
             self._shown_armed |= sent >= self._armed_at and shows_armed(message)
             if message.get_type() == 'HEARTBEAT':
-                self._boot_over |= message.system_status >= d.MAV_STATE_STANDBY
+                self._boot_over |= sent > self._rebooted_at + BEAT and (
+                    message.system_status >= d.MAV_STATE_STANDBY)
                 self._killed |= sent > self._handed_at and (
                     message.system_status > d.MAV_STATE_CRITICAL)
                 if sent > self._begun_again and self.world.now < self._begun_again + SHOWN:

@@ -36,6 +36,8 @@ def arm_command():
 def judged(rows, hand_over_at=-1.0, late=0.0, kind='px4'):
     """The faults of a vehicle on the ground; rows: time, (event, cause, mode)s, frame, command.
 
+    Events may be 'reboot' instead.
+
     The operator hands it over by the service at `hand_over_at` [s], and it takes off; frames that
     come after that were sent `late` [s] before.
     """
@@ -48,6 +50,9 @@ def judged(rows, hand_over_at=-1.0, late=0.0, kind='px4'):
     judge = Judge(world, kind, {'A': PLACE, 'B': AWAY})
     for now, events, frame, sent in rows:
         world.now = now
+        if events == 'reboot':
+            judge.rebooted()
+            events = []
         world.truth = [TruthEvent(
             now, name, AWAY if cause == 'B' else PLACE, mode=mode, cause=cause, seq=0)
             for name, cause, mode in events]
@@ -117,6 +122,19 @@ def test_a_mode_set_before_a_frame_showed_the_end_of_the_boot_may_be_of_the_boot
         (1.0, [], heartbeat(False, status), None),
         (15.0, [('mode', 'pilot', px4_mode(2))], None, None),
         (16.0, [], heartbeat(False), None), (17.0, [], None, arm_command())])
+    assert bool(counts['overridden']) is overridden
+
+
+@pytest.mark.parametrize(('armed_at', 'overridden'), [(1.0, False), (4.0, True)])
+def test_a_mode_set_in_a_boot_is_none_of_a_pilot_where_it_was_not_armed_since_the_grant(
+        armed_at, overridden):
+    rows = [(armed_at, [('armed', OURS, None)], heartbeat(True), None),
+            (armed_at + 0.5, [('disarmed', 'self', None)], heartbeat(False), None),
+            (3.0, [], heartbeat(False), None),
+            (5.0, 'reboot', heartbeat(False), None),  # sent just before
+            (5.6, [('mode', 'pilot', px4_mode(3))], None, None),
+            (6.2, [], heartbeat(False), None), (20.0, [], None, arm_command())]
+    counts = judged(sorted(rows, key=lambda row: row[0]), hand_over_at=3.0)
     assert bool(counts['overridden']) is overridden
 
 
