@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A task that was passed, and still to be judged, when its bridge or its mission was replaced."""
 import pytest
-from authority_bench import ARDUPILOT, BOTH, MODES, L, flying
+from authority_bench import ARDUPILOT, BOTH, MODES, PX4, L, flying
 from evidence_bench import Flight
 from findings_bench import distance, drop_messages, flown_once_each, listed, truthful
 from flight_bench import places
@@ -196,3 +196,22 @@ def test_the_current_item_is_set_after_a_hold_once_it_was_reported(kind):
     assert sets()
     bench.line.tampers.clear()
     flown_once_each(bench, 'ABC')
+
+
+@PX4
+@pytest.mark.parametrize(('seq', 'state', 'completed'), [
+    (1, d.MISSION_STATE_ACTIVE, ['A']), (0, d.MISSION_STATE_ACTIVE, []),
+    (1, d.MISSION_STATE_NOT_STARTED, [])])
+def test_the_next_item_reported_just_before_a_reboot_counts_where_it_comes_after_it(
+        kind, seq, state, completed):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: distance(bench, AT_A) < 15.0, 60.0)
+    for lost in ('MISSION_ITEM_REACHED', 'MISSION_CURRENT'):
+        drop_messages(bench, 'down', lost, lambda m: True)
+    assert bench.run(lambda: places(bench) == ['A'])
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=2.0)
+    bench.from_vehicle(d.MAVLink_mission_current_message(seq, 2, state, 1))
+    bench.line.tampers.clear()
+    bench.run(limit=2.0)
+    assert bench.completed() == completed

@@ -92,6 +92,7 @@ class EndBeforeRestart:
             now: steady time [s].
         """
         if message.mission_state != dialect.MISSION_STATE_COMPLETE:
+            self._note_next(message, now)
             return
         if self._flies and message.seq == self._epoch.last_flown:
             self._ended = self._epoch.number, message.seq, now
@@ -102,6 +103,15 @@ class EndBeforeRestart:
         if self._at_end and message.seq == seq and now < deadline:
             self._tasks.credit(item)
         self._ending = None
+
+    def _note_next(self, message: Message, now: float) -> None:
+        """Take the report that the next item is flown; after a restart the first one is."""
+        if self._ending is None or message.mission_state != dialect.MISSION_STATE_ACTIVE:
+            return
+        seq, item, deadline = self._ending
+        if message.seq == seq + 1 and now < deadline and not self._moves.in_mission:
+            self._tasks.credit(item)
+            self._ending = None
 
     def _credit_last(self, seq: int, now: float) -> None:
         """Complete the last item where it was inside: its REACHED may be lost before a cut."""
