@@ -41,6 +41,7 @@ class _Visit:
     state: _State
     next_at: float = math.inf  # [s] the next item was reached
     set_at: float = math.inf  # [s] another station has set the current item since
+    named: bool = True  # a REACHED names it; not to a bridge without a file, once it is replaced
     own_at: float = math.inf  # [s] a PX4 took off or landed by a mode of its own since
 
 
@@ -66,8 +67,6 @@ class DeliveredEvidence:
         self._px4 = px4
         self.known: dict[str, float] = {}  # tasks with evidence, and when [s] it was complete
         self._now = 0.0  # [s] of the tick
-        # on board when a bridge without a file began; None: none has
-        self._found: tuple[StoredItem, ...] | None = None
         self._held_from = -math.inf  # [s] visits before it need a current item in mission mode
         self._visits: dict[str, _Visit] = {}
         self._states: dict[int, _State] = {}  # by tick
@@ -96,7 +95,9 @@ class DeliveredEvidence:
         self.known = {task: at for task, at in self.known.items() if self._now - at > JUDGED}
         self._positions.clear()
         state = self._states.get(_tick(self._now))
-        self._found = () if state is None else state.items
+        for visit in self._visits.values():
+            end = visit.seq + 1
+            visit.named &= state is not None and state.items[:end] == visit.state.items[:end]
         if not self._px4:
             self._held_from = self._now
 
@@ -145,10 +146,9 @@ class DeliveredEvidence:
                     self.known[task] = self._now
 
     def _shows(self, visit: _Visit, sent: float, message: Message) -> bool:
-        state, end = self._states.get(_tick(sent)), visit.seq + 1
         if message.get_type() == 'MISSION_ITEM_REACHED':
-            return bool(message.seq == visit.seq) and sent < visit.next_at and (
-                self._found is None or self._found[:end] == visit.state.items[:end])
+            return visit.named and bool(message.seq == visit.seq) and sent < visit.next_at
+        state, end = self._states.get(_tick(sent)), visit.seq + 1
         if sent > visit.set_at:
             return False
         if state is not None and state.seq is None and visit.at < self._held_from:

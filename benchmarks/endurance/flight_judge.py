@@ -56,7 +56,7 @@ class Judge:
     A complete mission begins again at its first item where a pilot sets mission mode. What it
     flies again before the bridge may command it is counted apart, too, as
     `flown_again_for_pilot`: a failsafe is active, or the link was cut when the mode was set, so
-    that by the table it is not handed over.
+    that by the table it is not handed over. A hand-over by the service ends that.
     """
 
     def __init__(self, world: World, kind: str, places: dict[str, tuple[float, float, float]],
@@ -105,11 +105,11 @@ class Judge:
         self.stubborn = self._killed = False
         if by_service:
             self._handed_at, self._armed = self.world.now, self.world.vehicle.flight.armed
+            self._begun_again = math.inf
         self.counts['handed_back'] += 1
 
     def rebooted(self) -> None:
-        """Note a reboot: on the ground; an aircraft not armed since the grant is taken by no one.
-        """
+        """Note a reboot on the ground; not armed since the grant, it is taken by no one."""
         self.failing = self._boot_over = False
         self._rebooted_at = self.world.now
         if not self._armed and (self.known_at is None or self.world.now - self.known_at < DOUBT):

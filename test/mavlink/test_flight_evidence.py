@@ -153,6 +153,16 @@ def test_a_reached_of_a_mission_replaced_before_a_bridge_without_a_file_is_no_ev
     assert ('B' in evidence.known) is known
 
 
+def test_a_reached_of_a_mission_of_a_bridge_without_a_file_is_evidence():
+    visit = Visit(px4=True)
+    visit.evidence.add_state(0.0, visit.flight)
+    visit.evidence.forget()
+    visit.flight.items = ['home', 'X', 'B', 'C']
+    evidence = visit.fly(11.0)
+    evidence.delivered(10.0, d.MAVLink_mission_item_reached_message(2))
+    assert 'B' in evidence.known
+
+
 @pytest.mark.parametrize(('px4', 'mode', 'known'), [
     (False, FlightMode.HOLD, False), (False, FlightMode.MISSION, True),
     (True, FlightMode.HOLD, True)])

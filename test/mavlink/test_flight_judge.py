@@ -156,7 +156,8 @@ def test_what_a_pilot_lets_a_killed_vehicle_fly_again_is_counted_apart(kill, cou
     (False, True, False, 'flown_twice'),  # the bridge has it, and could have held it
     (False, False, False, 'flown_again_for_pilot'),  # the link was cut
     (True, True, False, 'flown_again_for_pilot'),
-    (False, False, True, 'flown_twice')])
+    (False, False, True, 'flown_twice'),
+    (False, False, 'handed over', 'flown_twice')])
 def test_a_complete_mission_that_a_pilot_begins_again_is_flown_for_him_until_it_is_held(
         failsafe, shown, commanded, counted):
     counts = judged([
@@ -166,8 +167,9 @@ def test_a_complete_mission_that_a_pilot_begins_again_is_flown_for_him_until_it_
         (3.0, [('mode', 'pilot', px4_mode(4, 4))], None, None),
         (3.5, [('failsafe', 'battery', None)] if failsafe else [], None, None),
         (4.0, [], heartbeat(True) if shown else None, None),
-        (7.0, [('command', OURS, None)] if commanded else [], heartbeat(True), None),
-        (9.0, [('item_reached', 'A', None)], None, None)])
+        (7.0, [('command', OURS, None)] if commanded is True else [], heartbeat(True), None),
+        (9.0, [('item_reached', 'A', None)], None, None)],
+        hand_over_at=7.0 if commanded == 'handed over' else -1.0)
     assert counts[counted] == 1
     assert counts['flown_twice'] + counts['flown_again_for_pilot'] == 1
 

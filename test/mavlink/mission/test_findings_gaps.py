@@ -7,13 +7,19 @@ from evidence_bench import SPEED, Flight
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 
 
-@pytest.mark.parametrize(('left_at', 'known'), [(97.0, False), (99.0, True)])
-def test_a_gap_after_the_mission_was_left_is_no_evidence(left_at, known):
-    flight = Flight()
-    flight.begin(A=100.0, B=500.0)
+def on_first_leg(x, repeats=True, **tasks):
+    """A flight in mission mode that has come to x [m], towards the first of the tasks."""
+    flight = Flight(repeats=repeats)
+    flight.begin(**tasks)
     flight.table.note_in_mission(flight.frame())
     flight.table.note_current(0, flight.now, True, flight.frame())
-    flight.fly_to(30.0)
+    flight.fly_to(x)
+    return flight
+
+
+@pytest.mark.parametrize(('left_at', 'known'), [(97.0, False), (99.0, True)])
+def test_a_gap_after_the_mission_was_left_is_no_evidence(left_at, known):
+    flight = on_first_leg(30.0, A=100.0, B=500.0)
     flight.lost = True
     flight.stay(3.0, SPEED)
     flight.lost = False
@@ -84,11 +90,7 @@ def test_an_item_reached_just_as_the_bridge_holds_the_vehicle_is_known(left, lat
 @pytest.mark.parametrize(('seconds', 'completed'), [(10.0, ['A']), (60.0, [])])
 def test_an_item_passed_without_a_position_since_waits_for_the_next_one(seconds, completed):
     """An ArduPilot in an EKF failsafe goes on with its mission; it has no valid position."""
-    flight = Flight(repeats=False)
-    flight.begin(A=100.0, B=150.0)
-    flight.table.note_in_mission(flight.frame())
-    flight.table.note_current(0, flight.now, True, flight.frame())
-    flight.fly_to(85.0)
+    flight = on_first_leg(85.0, repeats=False, A=100.0, B=150.0)
     flight.lost = True
     flight.stay(1.8, SPEED)  # less than a gap
     flight.table.note_current(1, flight.now, True, flight.frame())
@@ -106,11 +108,7 @@ def test_an_item_passed_without_a_position_since_waits_for_the_next_one(seconds,
     (94.0, 0, ['A']), (94.0, 1, []), (60.0, 0, [])])
 def test_a_reached_that_a_reboot_overtakes_counts_where_the_vehicle_came_there(
         repeats, x, seq, completed):
-    flight = Flight(repeats=repeats)
-    flight.begin(A=100.0, B=200.0)
-    flight.table.note_in_mission(flight.frame())
-    flight.table.note_current(0, flight.now, True, flight.frame())
-    flight.fly_to(x)
+    flight = on_first_leg(x, repeats=repeats, A=100.0, B=200.0)
     flight.table.invalidate()
     flight.now += 0.2
     flight.reached(seq)
@@ -118,11 +116,7 @@ def test_a_reached_that_a_reboot_overtakes_counts_where_the_vehicle_came_there(
 
 
 def test_a_place_passed_in_another_mode_is_no_evidence_for_what_a_station_skips_later():
-    flight = Flight()
-    flight.begin(A=100.0, B=500.0)
-    flight.table.note_in_mission(flight.frame())
-    flight.table.note_current(0, flight.now, True, flight.frame())
-    flight.fly_to(60.0)
+    flight = on_first_leg(60.0, A=100.0, B=500.0)
     flight.table.note_other_mode(flight.now)
     flight.fly_to(110.0)
     flight.fly_to(60.0)
@@ -135,11 +129,7 @@ def test_a_place_passed_in_another_mode_is_no_evidence_for_what_a_station_skips_
 
 
 def test_a_position_of_a_restart_that_is_not_noticed_yet_hides_no_task_passed_before():
-    flight = Flight()
-    flight.begin(A=100.0, B=500.0)
-    flight.table.note_in_mission(flight.frame())
-    flight.table.note_current(0, flight.now, True, flight.frame())
-    flight.fly_to(102.0)
+    flight = on_first_leg(102.0, A=100.0, B=500.0)
     flight.table.note_current(1, flight.now, True, flight.frame())
     flight.now += 0.2
     flight.table.add_position(PositionSample(0.1, (102.0, 0.0, 0.0), (0.0, 0.0, 0.0)), True,
@@ -162,11 +152,7 @@ def test_a_position_of_before_a_reboot_that_comes_after_it_is_dropped(kind):
 
 
 def test_a_position_that_comes_after_the_mode_of_a_restart_hides_no_place_of_before():
-    flight = Flight()
-    flight.begin(A=100.0, B=500.0)
-    flight.table.note_in_mission(flight.frame())
-    flight.table.note_current(0, flight.now, True, flight.frame())
-    flight.fly_to(100.0)
+    flight = on_first_leg(100.0, A=100.0, B=500.0)
     flight.table.note_in_mission(flight.frame())
     late = PositionSample(flight.now + 0.2, (100.0, 0.0, 50.0), (0.0, 0.0, 0.0))
     flight.now += 1.0
