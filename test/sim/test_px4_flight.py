@@ -127,6 +127,51 @@ def test_at_the_end_it_goes_to_hold_with_mission_state_5(bench):
     assert current(bench).mission_state == d.MISSION_STATE_COMPLETE
 
 
+def test_a_mission_that_has_ended_is_not_begun_again_in_the_air(bench):
+    bench.fly(waypoint(A), waypoint(B))
+    bench.reach(1)
+    bench.received.clear()
+    assert bench.set_mode(FlightMode.MISSION) == d.MAV_RESULT_ACCEPTED
+    assert bench.texts() == ['No valid mission available, loitering']
+    assert bench.flight.mode is FlightMode.HOLD
+    assert current(bench).mission_state == d.MISSION_STATE_COMPLETE
+    bench.set_current(0)
+    bench.set_mode(FlightMode.MISSION)
+    bench.reach(0)
+
+
+@pytest.mark.parametrize('flown', [1, 2])
+def test_disarmed_at_its_last_item_the_mission_begins_again(bench, flown):
+    bench.fly(waypoint(A), waypoint(B))
+    bench.reach(flown - 1)
+    bench.set_mode(FlightMode.RETURN)
+    bench.until(lambda: not bench.flight.armed)
+    assert current(bench).seq == 1
+    bench.set_mode(FlightMode.MISSION)
+    assert bench.arm() == 0
+    assert current(bench).seq == 0
+
+
+def test_disarmed_before_its_last_item_the_mission_goes_on(bench):
+    bench.fly(waypoint(A), waypoint(B), waypoint(C))
+    bench.reach(0)
+    bench.set_mode(FlightMode.RETURN)
+    bench.until(lambda: not bench.flight.armed)
+    assert bench.arm() == 0
+    bench.set_mode(FlightMode.MISSION)
+    assert current(bench).seq == 1
+
+
+def test_a_mission_loaded_on_the_ground_begins_at_its_last_item_where_that_is_current(bench):
+    bench.fly(waypoint(A))
+    bench.set_mode(FlightMode.RETURN)
+    bench.until(lambda: not bench.flight.armed)
+    bench.load(waypoint(A), waypoint(B, current=1))
+    bench.set_mode(FlightMode.MISSION)
+    assert bench.arm() == 0
+    assert current(bench).seq == 1
+
+
 def test_after_a_take_off_it_reports_that_its_mission_is_complete(bench):
     bench.load(waypoint(A), waypoint(B))
     assert current(bench).mission_state == d.MISSION_STATE_NOT_STARTED

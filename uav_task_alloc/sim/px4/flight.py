@@ -53,6 +53,7 @@ class Px4Flight(VehicleFlight):
     def reboot(self, now: float) -> None:
         super().reboot(now)
         self._finished = False
+        self._activated = self._disarmed = False  # the mission was flown; disarmed since
         self.result = NavigatorResult()
         self.feasible = not self._infeasible()  # the mission on board
         self._last_reached: int | None = None
@@ -66,11 +67,36 @@ class Px4Flight(VehicleFlight):
         self.track = self.rise_to(height)
         return True
 
+    def arm(self, force: bool = False) -> bool:
+        was_armed, done = self.armed, super().arm(force)
+        if done and not was_armed:
+            self._disarmed = True
+            if self.mode is FlightMode.MISSION:
+                self._activate()
+        return done
+
     def disarm(self, force: bool = False) -> bool:
         was_armed, done = self.armed, super().disarm(force)
         if was_armed and self.landed and self.mode in (FlightMode.RETURN, FlightMode.LAND):
             self.set_mode(FlightMode.HOLD)
         return done
+
+    def set_custom_mode(self, number: int) -> bool:
+        starts = number == self.custom_modes[FlightMode.MISSION] != self.custom_mode
+        if starts and self.armed and self._finished and not self._restarts:
+            self.texts.append((CRITICAL, 'No valid mission available, loitering'))
+            number = self.custom_modes[FlightMode.HOLD]
+        return super().set_custom_mode(number)
+
+    @property
+    def _restarts(self) -> bool:
+        """Whether the mission begins again, as `MissionBase::checkMissionRestart` has it."""
+        return self._activated and self._disarmed and self.seq + 1 == len(self.items)
+
+    def _activate(self) -> None:
+        if self._restarts:
+            self.seq, self._finished = 0, False
+        self._activated, self._disarmed = True, False
 
     def can_fly_mission(self) -> bool:
         reason = self._infeasible()
@@ -97,8 +123,8 @@ class Px4Flight(VehicleFlight):
         if mode is FlightMode.TAKEOFF:
             self.track = self.rise_to(max(self.body.position[2],
                                           self.home[2] + self.takeoff_height))
-        if mode is FlightMode.MISSION and self._finished:
-            self.seq, self._finished = 0, False
+        if mode is FlightMode.MISSION and self.armed:
+            self._activate()
 
     def start_mission(self) -> bool:
         return self.set_mode(FlightMode.MISSION) and self.arm()
@@ -118,6 +144,7 @@ class Px4Flight(VehicleFlight):
         last = max(0, len(self.items) - 1)
         self.seq = min(self.seq, last) if flagged is None else flagged
         self._finished, self.result = False, NavigatorResult()
+        self._activated = self.armed and self.mode is FlightMode.MISSION
         reason = self._infeasible() if self.items else ''
         self.feasible = bool(self.items) and not reason
         if reason:
