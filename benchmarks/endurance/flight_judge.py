@@ -53,10 +53,11 @@ class Judge:
     sets mission mode, is no fault of the bridge: `flown_again_killed` counts it apart. A mode
     that is set meanwhile hands nothing back, so that a command of the bridge is `overridden`.
 
-    A complete mission begins again at its first item where a pilot sets mission mode. What it
-    flies again before the bridge may command it is counted apart, too, as
-    `flown_again_for_pilot`: a failsafe is active, or the link was cut when the mode was set, so
-    that by the table it is not handed over. A hand-over by the service ends that.
+    A complete mission begins again at its first item where a pilot sets mission mode; that of a
+    PX4 where it was disarmed at its last item. What it flies again before the bridge may command
+    it is counted apart, too, as `flown_again_for_pilot`: a failsafe is active, or the link was
+    cut when the mode was set, or a pilot has armed the PX4, so that by the table it is not handed
+    over. A hand-over by the service ends that.
     """
 
     def __init__(self, world: World, kind: str, places: dict[str, tuple[float, float, float]],
@@ -93,6 +94,7 @@ class Judge:
         self._ended = False  # its mission, and it was not begun again
         self._begun_again = math.inf  # [s] another has, and the bridge has commanded nothing since
         self._unheld = False  # no heartbeat has shown that in time without a failsafe
+        self._armed_for_it = False  # it was begun again by an arming: no mode hands it over
         self._avoids = False  # its autopilot avoids other traffic
         self._stuck_since = self._moved_at = 0.0
         self._listed = world.tasks  # a new list begins a new transfer
@@ -105,6 +107,7 @@ class Judge:
         self.stubborn = self._killed = False
         if by_service:
             self._handed_at, self._armed = self.world.now, self.world.vehicle.flight.armed
+        if by_service or self._armed_for_it:
             self._begun_again = math.inf
         self.counts['handed_back'] += 1
 
@@ -139,7 +142,8 @@ class Judge:
                     message.system_status >= d.MAV_STATE_STANDBY)
                 self._killed |= sent > self._handed_at and (
                     message.system_status > d.MAV_STATE_CRITICAL)
-                if sent > self._begun_again and self.world.now < self._begun_again + SHOWN:
+                if (sent > self._begun_again and not self._armed_for_it
+                        and self.world.now < self._begun_again + SHOWN):
                     self._unheld &= self.failing
         if self.world.now - self._set_at < PASSED:
             self._crossed.update(name for name, place in self.places.items() if math.dist(
@@ -169,7 +173,8 @@ class Judge:
             self._item_reached(event)
         elif event.name == 'mode' and event.mode is not None:
             before, self._mode = self._mode, event.mode
-            self._note_begun(event)
+            if self._ended and self._class(event.mode) is ModeClass.MISSION:
+                self._note_begun(event, by_arming=False)
             if event.t - self._mode_at >= BEAT:
                 self._shown = before
             before, self._mode_at = self._shown, event.t
@@ -195,6 +200,8 @@ class Judge:
         elif event.name == 'command' and event.command == 'set current' and event.cause != OURS:
             self._set_at = event.t
             self._evidence.set_by_other(event.t)
+        elif event.name == 'mission_restart':
+            self._note_begun(event, by_arming=self.world.vehicle.flight.landed)
         elif event.name == 'mission_end':
             self._ended = True
         elif event.name == 'command' and event.cause == OURS:
@@ -208,11 +215,11 @@ class Judge:
         elif event.name == 'failsafe_over':
             self.failing = False
 
-    def _note_begun(self, event: TruthEvent) -> None:
-        """Note a mode that begins a complete mission again, by another than the bridge."""
-        if self._ended and event.cause not in (OURS, 'self') and event.mode is not None and (
-                self._class(event.mode) is ModeClass.MISSION):
+    def _note_begun(self, event: TruthEvent, by_arming: bool) -> None:
+        """Note that a mission begins again, by another than the bridge."""
+        if event.cause not in (OURS, 'self'):
             self._ended, self._begun_again, self._unheld = False, event.t, True
+            self._armed_for_it = by_arming
 
     def _item_reached(self, event: TruthEvent) -> None:
         assert event.seq is not None

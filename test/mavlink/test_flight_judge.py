@@ -174,6 +174,23 @@ def test_a_complete_mission_that_a_pilot_begins_again_is_flown_for_him_until_it_
     assert counts['flown_twice'] + counts['flown_again_for_pilot'] == 1
 
 
+@pytest.mark.parametrize(('cause', 'handed_over', 'counted'), [
+    ('pilot', False, 'flown_again_for_pilot'), ('pilot', True, 'flown_twice'),
+    (OURS, False, 'flown_twice')])
+def test_a_mission_of_a_px4_that_an_arming_begins_again_is_flown_for_who_armed(
+        cause, handed_over, counted):
+    counts = judged([
+        (1.0, [('armed', OURS, None), ('item_reached', 'A', None)], heartbeat(True), None),
+        (1.1, [], d.MAVLink_mission_item_reached_message(0), None),
+        (2.0, [('item_reached', 'B', None)], None, None),
+        (3.0, [('armed', cause, None), ('mission_restart', cause, None)], None, None),
+        (4.0, [], heartbeat(True), None), (7.0, [], heartbeat(True), None),
+        (9.0, [('item_reached', 'A', None)], None, None)],
+        hand_over_at=7.0 if handed_over else -1.0)
+    assert counts[counted] == 1
+    assert counts['flown_twice'] + counts['flown_again_for_pilot'] == 1
+
+
 @pytest.mark.parametrize(('late', 'overridden'), [(2.0, False), (0.5, True)])
 def test_a_heartbeat_of_before_a_hand_over_by_the_service_shows_no_kill_after_it(late, overridden):
     killed = heartbeat(False, d.MAV_STATE_FLIGHT_TERMINATION)

@@ -133,11 +133,24 @@ def test_the_modes_that_land_end_on_the_ground_below(kind, number):
 
 
 @pytest.mark.parametrize(('kind', 'number'), RETURNS + LANDS)
-def test_after_the_landing_px4_goes_to_hold_and_the_copter_stays_in_its_mode(kind, number):
+def test_after_the_landing_px4_enters_the_mode_before_and_the_copter_stays_in_its_mode(
+        kind, number):
     bench = flying(kind)
     bench.set_mode(number)
     bench.until(lambda: not bench.flight.armed)
-    assert reported_mode(bench) == (number if bench.own else px4_mode(4, 3))
+    assert reported_mode(bench) == (number if bench.own else px4_mode(4, 4))
+
+
+@pytest.mark.parametrize('by', ['station', 'failsafe'])
+def test_after_a_landing_from_hold_px4_holds(by):
+    bench = flying('px4')
+    bench.set_mode(px4_mode(4, 3))
+    if by == 'failsafe':
+        bench.vehicle.failsafe('battery', px4_mode(4, 6))
+    else:
+        bench.set_mode(px4_mode(4, 6))
+    bench.until(lambda: not bench.flight.armed)
+    assert reported_mode(bench) == px4_mode(4, 3)
 
 
 def test_px4_stays_in_the_land_mode_that_it_is_given_on_the_ground():
@@ -153,7 +166,7 @@ def test_the_landing_of_a_return_item_ends_the_same_way(kind):
         1, 1, 0, 2, d.MAV_CMD_NAV_RETURN_TO_LAUNCH, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0)
     bench.fly(waypoint((50.0, 0.0, 30.0)), home)
     bench.until(lambda: not bench.flight.armed)
-    assert reported_mode(bench) == (3 if bench.own else px4_mode(4, 3))
+    assert reported_mode(bench) == (3 if bench.own else px4_mode(4, 4))
 
 
 def test_a_change_between_two_stick_modes_is_a_change():

@@ -64,6 +64,10 @@ class MissionServer:
         if mission_type == FENCE_TYPE:
             self.on_fence()
 
+    def set_current(self, seq: int) -> bool:
+        """MISSION_SET_CURRENT; False where it is refused."""
+        return self.flight.set_current(seq)
+
     def progress(self) -> tuple[int, int, int]:
         """Fields total, mission_state and mission_mode of MISSION_CURRENT."""
         raise NotImplementedError

@@ -257,7 +257,7 @@ class Vehicle(Interventions):
         if m.target_component not in (AUTOPILOT_COMPONENT, 0):
             return []
         self.flight.note('command', command='set current', seq=m.seq, cause=_station(m))
-        return [self._mission_current()] if self.flight.set_current(m.seq) else []
+        return [self._mission_current()] if self.mission.set_current(m.seq) else []
 
 
 def _station(m: Message) -> str:

@@ -25,6 +25,8 @@ from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.sim.config import FlightMode
+
 BY_HAND = '; given back by ~/hand_over'
 
 
@@ -160,6 +162,21 @@ def test_armed_again_it_takes_off_where_the_report_of_its_landing_was_lost(kind)
 
 
 # arming by others
+
+@PX4
+def test_a_px4_that_a_pilot_arms_after_a_return_stays_with_the_pilot(kind):
+    bench = flying(kind, 'ABC')
+    vehicle = bench.vehicles[1]
+    vehicle.rc_mode(MODES[kind].rtl)
+    assert bench.run(lambda: not vehicle.flight.armed, 120.0)
+    assert vehicle.flight.mode is FlightMode.MISSION  # of before the return
+    bench.run(limit=3.0)
+    assert status_is(bench, L)
+    assert vehicle.rc_arm(True)
+    assert bench.run(lambda: bench.executor().telemetry.airborne, 20.0)
+    assert sends_no_command(bench)
+    assert status_is(bench, L)
+
 
 @BOTH
 @pytest.mark.parametrize('state', [H, S])

@@ -110,8 +110,9 @@ class BridgeRestart:
     def _keeps_mode(self, record: AuthorityRecord) -> bool:
         """Whether it is on the ground in the mode in which it came down."""
         state = self._state
-        return state.mode == record.mode or (  # PX4 changes to Hold when it has landed
-            state.is_return(record.mode) and state.class_of(state.mode) is ModeClass.HOLD)
+        return state.mode == record.mode or (  # PX4, landed, enters its mode of before the return
+            state.is_return(record.mode)
+            and state.class_of(state.mode) in (ModeClass.HOLD, ModeClass.MISSION))
 
     def _agrees(self, record: AuthorityRecord) -> bool:
         state = self._state

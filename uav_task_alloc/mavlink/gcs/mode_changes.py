@@ -96,7 +96,7 @@ class ModeChanges:
         if self._apply_known_cause(before, mode, now, why):
             return
         if new is ModeClass.MISSION:
-            self._mission_set(mode, now, why)
+            self._mission_set(before, mode, now, why)
         elif was is ModeClass.MISSION and self._mission_ended(mode, now):
             state.apply(AuthorityEvent.MISSION_ENDED, now, why)
             state.descending = state.is_return(mode)
@@ -136,15 +136,21 @@ class ModeChanges:
             return False
         return True
 
-    def _mission_set(self, mode: int, now: float, why: str) -> None:
+    def _mission_set(self, before: int, mode: int, now: float, why: str) -> None:
         """Apply an unexpected MISSION: set by a pilot, unless our own command was delayed."""
         state = self._state
         if state.sent.was_recently_sent(mode, now):
             state.apply(AuthorityEvent.OWN, now, why)
         elif state.telemetry.airborne:
             state.apply(AuthorityEvent.TO_MISSION, now, f'{why} in flight')
-        else:
-            state.mission_on_ground = True  # it may take off with it
+        else:  # it may take off with it
+            state.mission_on_ground = not self._left_return(before)
+
+    def _left_return(self, before: int) -> bool:
+        """Whether it is disarmed after a return, by which PX4 enters its mode of before that."""
+        state = self._state
+        return self._family == 'px4' and not state.armed and (
+            state.class_of(before) is ModeClass.OWN)
 
     def _hold_set(self, before: int, mode: int, now: float, why: str) -> None:
         """Apply an unexpected HOLD: the end of a take-off or landing, or set by a pilot."""
@@ -153,7 +159,7 @@ class ModeChanges:
         if state.profile.takeoff_mode == before and climb is not None:
             self._climb_ended(climb, now, why)
         elif state.descending and state.is_return(before):
-            # PX4 changes to Hold when it has landed
+            # PX4 enters its mode of before the return when it has landed
             if not telemetry.grounded:
                 state.suspend_until_explained(lambda t: telemetry.grounded, why, now)
         elif state.sent.was_recently_sent(mode, now):

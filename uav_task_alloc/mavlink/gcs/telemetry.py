@@ -266,7 +266,10 @@ class Telemetry:
 
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
-        self._set_mode(self._profile.mode_function(message.custom_mode), now)
+        mode = self._profile.mode_function(message.custom_mode)
+        if mode is ModeFunction.MISSION and self._profile.atomic and not self.armed:
+            mode = ModeFunction.HOLD  # PX4 enters it after a return too, and flies nothing
+        self._set_mode(mode, now)
         self._mode_frame = self.frame
         self._landed(self.landed)
         if self.mode is ModeFunction.MISSION:

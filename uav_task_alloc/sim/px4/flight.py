@@ -19,6 +19,8 @@ from uav_task_alloc.sim.modes import PX4_MODES, Px4Auto, Px4Main, px4_auto, px4_
 from uav_task_alloc.sim.stored_item import StoredItem
 
 _MAX_DISTANCE = 10_000.0  # [m] MIS_DIST_1WP and MIS_DIST_WPS
+_CLIMB_FROM = 0.8  # [m] NAV_MC_ALT_RAD
+_KEEPS_DISARMED = (FlightMode.RETURN, FlightMode.LAND)  # modes that prevent arming
 _REPEATS = 10  # repetitions of REACHED
 _REPEAT_PERIOD = 1.0  # [s]
 
@@ -54,6 +56,8 @@ class Px4Flight(VehicleFlight):
         super().reboot(now)
         self._finished = False
         self._activated = self._disarmed = False  # the mission was flown; disarmed since
+        self._climbs_first = False  # straight up, where its item is higher
+        self._mode_after_disarming = self.custom_mode
         self.result = NavigatorResult()
         self.feasible = not self._infeasible()  # the mission on board
         self._last_reached: int | None = None
@@ -77,8 +81,10 @@ class Px4Flight(VehicleFlight):
 
     def disarm(self, force: bool = False) -> bool:
         was_armed, done = self.armed, super().disarm(force)
-        if was_armed and self.landed and self.mode in (FlightMode.RETURN, FlightMode.LAND):
-            self.set_mode(FlightMode.HOLD)
+        if was_armed and not self.armed:
+            with self.caused_by('self'):
+                self._set_number(self._mode_after_disarming)
+            self.track = None
         return done
 
     def set_custom_mode(self, number: int) -> bool:
@@ -86,7 +92,10 @@ class Px4Flight(VehicleFlight):
         if starts and self.armed and self._finished and not self._restarts:
             self.texts.append((CRITICAL, 'No valid mission available, loitering'))
             number = self.custom_modes[FlightMode.HOLD]
-        return super().set_custom_mode(number)
+        done = super().set_custom_mode(number)
+        if done and self._cause != 'failsafe' and self.mode not in _KEEPS_DISARMED:
+            self._mode_after_disarming = number
+        return done
 
     @property
     def _restarts(self) -> bool:
@@ -96,7 +105,8 @@ class Px4Flight(VehicleFlight):
     def _activate(self) -> None:
         if self._restarts:
             self.seq, self._finished = 0, False
-        self._activated, self._disarmed = True, False
+            self.note('mission_restart', cause=self._cause)
+        self._activated, self._disarmed, self._climbs_first = True, False, True
 
     def can_fly_mission(self) -> bool:
         reason = self._infeasible()
@@ -191,7 +201,8 @@ class Px4Flight(VehicleFlight):
             return
         self._finished = self.result.finished = True
         self.note('mission_end')
-        self.set_mode(FlightMode.HOLD)
+        if not self.landed:
+            self.set_mode(FlightMode.HOLD)
 
     def _end_of(self, track: Track) -> None:
         if self.mode in (FlightMode.TAKEOFF, FlightMode.LAND):
@@ -214,10 +225,14 @@ class Px4Flight(VehicleFlight):
 
     def make_track(self, item: StoredItem) -> Track:
         track = super().make_track(item)
-        if not self.landed or not track.points or track.lands:
+        if not track.points or track.lands:
             return track
-        x, y, z = self.body.position
-        top = max(track.points[0][2], z + self.takeoff_height)
+        climbs, self._climbs_first = self._climbs_first, False
+        (x, y, z), top = self.body.position, track.points[0][2]
+        if self.landed:
+            top = max(top, z + self.takeoff_height)
+        elif not climbs or top <= z + _CLIMB_FROM:
+            return track
         return Track(((x, y, top), *track.points), min(track.radius, 2.0), track.hold)
 
     def climb(self, target: Point) -> Track:

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.transport.codec import Message, with_plan_id
 from uav_task_alloc.sim.config import FlightMode, StorageChange
+from uav_task_alloc.sim.flight import CRITICAL
 from uav_task_alloc.sim.mission_server import (
     CLEARED_TYPES,
     MISSION_TYPE,
@@ -176,6 +177,12 @@ class Px4MissionServer(MissionServer):
     def _crc(self) -> int:
         """Id of what is stored of the transfer's type."""
         return px4_crc(self.stores[self._type]) if self._type else self._id
+
+    def set_current(self, seq: int) -> bool:
+        if self._state is not _State.IDLE:
+            self.flight.texts.append((CRITICAL, 'WPM: IGN WP CURR CMD: Busy'))
+            return False
+        return self.flight.set_current(seq)
 
     def _request_list(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._seq == len(self.stores[self._type]):  # all was sent: its ACK may be lost
