@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Landing, `relaunch`, and arming by others."""
 import math
+from dataclasses import replace
 
 import pytest
 from authority_bench import (
@@ -159,6 +160,26 @@ def test_armed_again_it_takes_off_where_the_report_of_its_landing_was_lost(kind)
     assert not [note for note in bench.notes if 'mode mission' in note]
     assert bench.run(lambda: bench.completed()[-1:] == ['B'], 120.0)
     assert bench.authority() is H
+
+
+@PX4
+@pytest.mark.parametrize('relaunch', ['operator', 'automatic'])
+def test_a_px4_is_not_armed_in_mission_mode_after_a_return(kind, relaunch):
+    bench = AuthorityBench(kind, relaunch=relaunch).discover()
+    vehicle = bench.vehicles[1]
+    bench.assign(task_list('A', returns=True))
+    assert bench.run(lambda: bench.completed() == ['A'], 120.0)
+    bench.assign(replace(task_list('', 2), returns=True))
+    assert bench.run(lambda: not vehicle.flight.armed, 120.0)
+    assert vehicle.flight.mode is FlightMode.MISSION  # of before the return
+    bench.run(limit=3.0)
+    bench.assign(task_list('B', 3))
+    if relaunch == 'operator':
+        assert bench.hand_over() == ''
+    assert bench.run(lambda: bench.completed()[-1:] == ['B'], 120.0)
+    events = bench.truth[1]
+    armed = max(n for n, event in enumerate(events) if event.name == 'armed')
+    assert [event.mode for event in events[:armed] if event.name == 'mode'][-1] == MODES[kind].hold
 
 
 # arming by others

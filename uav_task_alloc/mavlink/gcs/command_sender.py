@@ -204,7 +204,8 @@ class CommandSender:
 
         self.commanded = mode
         return self.start(Command(_mode_name(mode), self._profile.mode_command(
-            self._peer, mode), lambda: telemetry.mode is mode), now, done)
+            self._peer, mode), lambda: (
+                telemetry.mode is mode and not telemetry.arms_into_mission)), now, done)
 
     def set_current(self, seq: int, now: float, completion: _Completion) -> list[Message]:
         """Set the current mission item, by MISSION_SET_CURRENT if the command is unsupported.
@@ -255,9 +256,10 @@ class CommandSender:
         if not telemetry.grounded or not telemetry.has_position:
             self.waits_for = 'a position' if telemetry.grounded else 'its landed state'
             return []
-        if telemetry.mode is not ModeFunction.HOLD and not self._profile.amsl_takeoff and (
-                ModeFunction.HOLD in self._profile.set_mode):
-            return self.set_mode(ModeFunction.HOLD, now)  # ArduPilot arms and climbs in GUIDED
+        if ModeFunction.HOLD in self._profile.set_mode and (
+                telemetry.arms_into_mission or (  # ArduPilot arms and climbs in GUIDED
+                    telemetry.mode is not ModeFunction.HOLD and not self._profile.amsl_takeoff)):
+            return self.set_mode(ModeFunction.HOLD, now)
         if not telemetry.armed:
             self.armed_here = False
             arm = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)

@@ -69,7 +69,8 @@ class Telemetry:
         self.height = math.nan  # [m] above home
         self.altitude = math.nan  # [m] AMSL
         self.battery = math.nan  # 0..1, of the battery with least remaining
-        self.armed = False
+        # a PX4 in mission mode flies nothing until it is armed, as after a return
+        self.armed = self.arms_into_mission = False
         self.mode, self.mode_at = ModeFunction.UNKNOWN, -math.inf  # it was set then [s]
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
@@ -197,6 +198,7 @@ class Telemetry:
     def note_acknowledged(self, mode: ModeFunction) -> None:
         """Take a mode that the vehicle has acknowledged; its heartbeats may be older."""
         self._set_mode(mode, self.received_at)
+        self.arms_into_mission = False
         self._mode_frame = self.frames.newest
 
     def _set_mode(self, mode: ModeFunction, now: float) -> None:
@@ -267,9 +269,9 @@ class Telemetry:
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         mode = self._profile.mode_function(message.custom_mode)
-        if mode is ModeFunction.MISSION and self._profile.atomic and not self.armed:
-            mode = ModeFunction.HOLD  # PX4 enters it after a return too, and flies nothing
-        self._set_mode(mode, now)
+        self.arms_into_mission = (
+            mode is ModeFunction.MISSION and self._profile.atomic and not self.armed)
+        self._set_mode(ModeFunction.HOLD if self.arms_into_mission else mode, now)
         self._mode_frame = self.frame
         self._landed(self.landed)
         if self.mode is ModeFunction.MISSION:
