@@ -202,7 +202,11 @@ class VehicleFlight(Navigation):
         return mode in self.custom_modes and self.set_custom_mode(self.custom_modes[mode])
 
     def set_custom_mode(self, number: int) -> bool:
-        """Change the mode; False where it is unknown or not possible now."""
+        """Change the mode; False where it is unknown or not possible now.
+
+        Args:
+            number: `custom_mode` of its autopilot.
+        """
         if number not in self.modes:
             return False
         mode = self.modes[number].mode
