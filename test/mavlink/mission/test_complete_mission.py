@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A complete mission of ArduPilot, which begins again where mission mode is entered."""
 import pytest
-from authority_bench import ARDUPILOT, MODES, flying
+from authority_bench import ARDUPILOT, MODES, PX4, flying
 from findings_bench import commanded, flown_once_each
 from flight_bench import places
 from mission_bench import task_list
@@ -82,3 +82,29 @@ def test_a_mission_reported_once_as_not_started_flies_on(kind):
     flown_once_each(bench, 'ABC')
     assert changed
     assert commanded(bench) == before
+
+
+@PX4
+@pytest.mark.parametrize('armed_by', ['bridge', 'pilot'])
+def test_a_px4_disarmed_at_its_last_item_does_not_begin_again_where_it_stands(kind, armed_by):
+    bench = flying(kind, 'AB')
+    vehicle = bench.vehicles[1]
+    assert bench.run(lambda: bench.completed() == ['A'], 100.0)
+    bench.assign(task_list('B', 2))
+    bench.run(limit=0.3)
+    vehicle.kill_switch()  # it falls to the ground below A
+    bench.run(limit=6.0)
+    vehicle.kill_switch_off()
+    bench.run(limit=3.0)
+    if armed_by == 'pilot':
+        vehicle.rc_mode(MODES[kind].stick)
+        vehicle.rc_arm(True)
+        vehicle.rc_stick((0.0, 0.0, 3.0))
+        bench.run(limit=10.0)
+        vehicle.rc_stick(None)
+        bench.run(limit=3.0)
+        vehicle.rc_mode(MODES[kind].land)
+        assert bench.run(lambda: not vehicle.flight.armed, 60.0)
+        bench.run(limit=3.0)
+    assert bench.hand_over() == ''
+    flown_once_each(bench, 'AB')

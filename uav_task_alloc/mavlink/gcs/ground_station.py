@@ -225,20 +225,20 @@ class GroundStation:
         for executor in executors:
             executor.onboard.list.perhaps_flown = frozenset(
                 task for other in unread if other is not executor
-                for task in other.onboard.resume.ahead)
+                for task in other.onboard.resume.flown.ahead)
 
     def _drop_flown_by_others(self, now: float) -> None:
         """Complete tasks of a list that another UAV has flown while the bridge was down."""
         executors = [(s.uav_id, s.executor) for s in self.sessions.values()]
         known: list[tuple[TaskList | None, int]] = [
-            (executor.onboard.tasks, executor.onboard.resume.flown_count(now))
+            (executor.onboard.tasks, executor.onboard.resume.flown.count(now))
             for _, executor in executors]
         if known == self._compared or not any(flown for _, flown in known):
             return
         self._compared = known
         for (_, assigned), (other, executor) in permutations(executors, 2):
             if assigned.onboard.tasks is not None:
-                assigned.drop_flown(executor.onboard.resume.flown_tasks(
+                assigned.drop_flown(executor.onboard.resume.flown.tasks_among(
                     assigned.onboard.list.open_tasks(), now), other)
 
     def _discover(self, address: RemoteKey, message: Message, now: float) -> VehicleSession | None:

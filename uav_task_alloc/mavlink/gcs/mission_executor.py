@@ -25,6 +25,7 @@ from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessage
 from uav_task_alloc.mavlink.gcs.end_actions import EndActions
 from uav_task_alloc.mavlink.gcs.end_of_list import EndOfList
 from uav_task_alloc.mavlink.gcs.event_retry import EventRetry
+from uav_task_alloc.mavlink.gcs.flown_items import MAX_AGE
 from uav_task_alloc.mavlink.gcs.list_execution import ListExecution
 from uav_task_alloc.mavlink.gcs.message_rates import MessageRates
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
@@ -32,7 +33,6 @@ from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRule
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.restored_record import restore_record
-from uav_task_alloc.mavlink.gcs.resume import MAX_AGE
 from uav_task_alloc.mavlink.gcs.send_gate import allowed_messages
 from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
 from uav_task_alloc.mavlink.gcs.takeoff import Takeoff

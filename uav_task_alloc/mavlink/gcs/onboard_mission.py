@@ -63,7 +63,7 @@ class OnboardMission:
         self.mission, self._latest_diff = VerifiedMission(self.own, profile.atomic), LatestDiff()
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
-        self._taken = False  # the vehicle has taken all items of this upload
+        self.taken = False  # the vehicle has taken all items of the latest transfer
         self._unconfirmed: tuple[MissionDiff, TaskList] | None = None  # sent; perhaps on board
         self.item_time = self.upload_started_at = 0.0  # [s] per item, smoothed; of the latest
         self._completed_for: tuple[TaskList, int] | None = None
@@ -87,12 +87,12 @@ class OnboardMission:
     @property
     def open(self) -> bool:
         """Whether a running or ended transfer is not known to be taken by the vehicle."""
-        return self._unconfirmed is not None or (self._uploading is not None and not self._taken)
+        return self._unconfirmed is not None or (self._uploading is not None and not self.taken)
 
     @property
     def unknown_upload(self) -> MissionDiff | None:
         """What a transfer would put on board that is not known to be taken; None: none."""
-        uploading = self._unconfirmed or (None if self._taken else self._uploading)
+        uploading = self._unconfirmed or (None if self.taken else self._uploading)
         return uploading and uploading[0]
 
     @property
@@ -100,11 +100,6 @@ class OnboardMission:
         """Whether the transfer is for an older list."""
         return (self._uploading is not None and self.tasks is not None
                 and self._uploading[1].revision != self.tasks.revision)
-
-    @property
-    def taken(self) -> bool:
-        """Whether the vehicle has taken all items of the latest transfer."""
-        return self._taken
 
     @property
     def tasks(self) -> TaskList | None:
@@ -133,6 +128,9 @@ class OnboardMission:
                 return MissionDiff(DiffKind.KEEP, self.held, current or 0)
             if self.list.horizon.grow():
                 return self.diff()
+        if 0 < diff.start == len(diff.items) - 1 and self._profile.atomic and (
+                telemetry.disarmed_since_mission):
+            return MissionDiff(DiffKind.REPLACE, wanted, 0)  # PX4 would begin at its first item
         room = self._profile.rules.capacity - self.own
         if diff.kind is DiffKind.APPEND and (self._profile.atomic or len(diff.items) > room):
             return diff_missions(self.held, current, wanted, append=False)
@@ -156,7 +154,7 @@ class OnboardMission:
     def begin_upload(self, diff: MissionDiff, now: float) -> list[Message]:
         """Start the upload of `diff` for the present list."""
         assert self.tasks is not None
-        self._uploading, self._taken, self.transfer_failed = (diff, self.tasks), False, False
+        self._uploading, self.taken, self.transfer_failed = (diff, self.tasks), False, False
         self.upload_started_at, self._reports.sent_since = now, None
         self.list.horizon.begin()
         self._at_start = self._done(), self.list.left_out
@@ -170,7 +168,7 @@ class OnboardMission:
     def next_item(self) -> int | None:
         """Seq to set during a transfer: past what PX4 has flown meanwhile; None: it flies on."""
         if self._uploading is None or not self._profile.atomic or (
-                self._may_be_of_new and not self._taken):
+                self._may_be_of_new and not self.taken):
             return None
         return next_unflown(self.progress) if self.set_current_to is None else self.set_current_to
 
@@ -203,7 +201,7 @@ class OnboardMission:
         """Advance time; returns the messages to send."""
         out = self.upload.step(now)
         self._reports.step(self.unknown_upload, now)
-        if self._uploading is not None and not self._taken and self._profile.atomic and (
+        if self._uploading is not None and not self.taken and self._profile.atomic and (
                 first_task(self._uploading[0]) in self.progress.completed) and (
                 not self.upload.sent_all):  # it would start at a task flown meanwhile
             out += self.upload.cancel(now)
@@ -269,7 +267,7 @@ class OnboardMission:
         if self.upload.busy:
             self.upload.reset()
         if self._uploading is not None:
-            if self._reports.sent_since is not None and not self._taken:
+            if self._reports.sent_since is not None and not self.taken:
                 self._unconfirmed = self._uploading
             else:
                 self._reports.credit(self._uploading[0])
@@ -299,10 +297,10 @@ class OnboardMission:
 
     def complete_flown(self, now: float) -> None:
         """Complete the tasks that the vehicle has flown while the bridge was down."""
-        flown = self.resume.flown_count(now)
+        flown = self.resume.flown.count(now)
         if flown and self.tasks and (self.tasks, flown) != self._completed_for:
             self._completed_for = self.tasks, flown
-            self.progress.complete_offline(self.resume.flown_tasks(
+            self.progress.complete_offline(self.resume.flown.tasks_among(
                 self.list.open_tasks(), now))
 
     def _settle(self, now: float) -> None:
@@ -324,12 +322,13 @@ class OnboardMission:
                     self._on_failure(event, diff, tasks, now)
 
     def _begin_epoch(self, diff: MissionDiff, now: float) -> None:
-        if self._taken:
+        if self.taken:
             return
-        self._taken = True
+        self.taken = True
+        self._telemetry.note_new_mission()
         of_new = self._reports.begin_new(diff)
         self.item_time = (self.item_time + (now - self.upload_started_at) / len(diff.items)) / 2.0
-        self.resume.keep_flown()
+        self.resume.flown.keep()
         self._flown_unset, later = None, resumed_at(
             self.progress.items, self.progress.current, diff)
         if diff.kind is DiffKind.APPEND:
@@ -350,7 +349,7 @@ class OnboardMission:
         if not self._profile.atomic or not self.resume.located or not self._reports.correct(
                 self.resume.read_again(held, self.tasks)[0], now):
             return False
-        self._taken, self.set_current_to, self.mission.altered = False, None, True
+        self.taken, self.set_current_to, self.mission.altered = False, None, True
         return True
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
@@ -376,7 +375,7 @@ class OnboardMission:
                 held, known, self.tasks is not None, lambda: self._can_continue(held), now):
             self._reports.confirm()
             return
-        self.resume.keep_flown()
+        self.resume.flown.keep()
         if self._correct(held, now):
             return
         (items, since), seq = self.resume.read_again(held, self.tasks), self._telemetry.current
@@ -392,7 +391,7 @@ class OnboardMission:
     def _on_failure(self, event: Failed, diff: MissionDiff, tasks: TaskList, now: float) -> None:
         self.mission.interrupt()
         self.transfer_failed = event.reason != SUPERSEDED
-        if event.result is None and self._reports.sent_since is not None and not self._taken:
+        if event.result is None and self._reports.sent_since is not None and not self.taken:
             self._unconfirmed = diff, tasks
         else:
             self._reports.credit(diff)

@@ -26,10 +26,10 @@ def restore_record(record: AuthorityRecord | None, onboard: OnboardMission,
         onboard.list.stored_pieces, resume.recorded_upload = record.pieces, record.uploading
         resume.recorded = record.mission, record.current, record.arrived
         resume.passed, onboard.progress.coverage.recorded = record.passed, True
-        resume.ahead = {mark.task: mark[1:4] for mark in record.ahead}
+        resume.flown.ahead = {mark.task: mark[1:4] for mark in record.ahead}
         for mark in record.ahead:
             if mark.flown:
-                resume.seen_passed.add(mark.task, mark[1:4])
+                resume.flown.seen_passed.add(mark.task, mark[1:4])
         for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
             t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
             resume.note_seen(PositionSample(t, (x, y, z), (east, north, up)))
@@ -40,4 +40,4 @@ def restore_record(record: AuthorityRecord | None, onboard: OnboardMission,
         resume.current_unreliable = resume.was_replacing or (
             record.state is AuthorityState.LOST and not resume.was_in_mission)
     for mark in watch.marks.values():
-        resume.note_mark(mark.task, mark[1:4], mark.flown)
+        resume.flown.note_mark(mark.task, mark[1:4], mark.flown)

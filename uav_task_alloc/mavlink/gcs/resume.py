@@ -13,31 +13,23 @@ from collections.abc import Callable, Iterable
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin, to_enu
-from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
-from uav_task_alloc.mavlink.gcs.seen_passed import SeenPassed
+from uav_task_alloc.mavlink.gcs.flown_items import FlownItems
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReached, UnreadReports
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import (
     Item,
-    MissionStop,
     TaskList,
-    alike,
     with_position,
 )
 from uav_task_alloc.mavlink.mission.passed_items import flown_between, flown_in_gap
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
-from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.mavlink.mission.task_items import TaskItems
-from uav_task_alloc.model import Point, Task
+from uav_task_alloc.model import Point
 
-_SAME_PLACE = 1.0  # [m]
-_MAX_MISSIONS = 4  # that were read and are kept
 _LANDED_STATE_DELAY = 3.0  # [s] after the mission was read in which it comes, as a rule
-MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a new one
-_NAMED_AGE = 3540.0  # [s] more, where it is a task of the previous run, which recorded its id
 
 
 def checksum(items: Iterable[Item]) -> int:
@@ -46,7 +38,8 @@ def checksum(items: Iterable[Item]) -> int:
 
 
 class Resume:
-    """Locates a vehicle in its onboard mission once, and finds the tasks it has flown.
+    """Locates a vehicle in its onboard mission once, and credits the items it has flown.
+
 
     Args:
         profile: of its autopilot.
@@ -60,10 +53,7 @@ class Resume:
         self._profile, self._origin = profile, origin
         self._telemetry, self._progress = telemetry, progress
         self._tasks = TaskItems(profile, origin, progress.coverage, lambda: self.cruise())
-        self.unflown: dict[str, Point] = {}  # [m] ENU, by task; skipped by another station
-        self.reported: set[str] = set()  # flown and reported by the previous run
-        self.ahead: dict[str, Point] = {}  # [m] ENU, by id; the next tasks of the previous run
-        self.seen_passed = SeenPassed()
+        self.flown = FlownItems(origin, progress, self._tasks)
         # checksum of the mission, current item and whether it was seen there, of the previous run
         self.recorded: tuple[int | None, int | None, bool] = None, None, False
         self.passed: tuple[int, ...] = ()  # see `AuthorityRecord`
@@ -71,18 +61,10 @@ class Resume:
         self.recorded_upload: tuple[int, ...] = ()  # checksum and first item of an upload then
         self.was_disarmed, self.was_in_mission = True, False  # in the last record
         self.cruise: Callable[[], float] = lambda: math.nan  # [m/s]; NaN: not known
-        self._missions: tuple[tuple[Item, ...], ...] = ()  # read so far
         self.current_unreliable = self.was_replacing = False  # items before it may be unflown
         self._rebooted = self._passed_recorded = False
         self._unread = UnreadReports(telemetry, progress.positions, profile.atomic)
         self.reset()
-
-    def note_mark(self, task: str, place: Point, flown: bool) -> None:
-        """Take a task that the previous run has reported as flown, or as skipped by another."""
-        if flown:
-            self.reported.add(task)
-        else:
-            self.unflown[task] = place
 
     def note_seen(self, sample: PositionSample) -> None:
         """Take a position that the previous run has recorded."""
@@ -103,13 +85,7 @@ class Resume:
         """Forget the location: the vehicle was restarted, or is another one."""
         self.located = False
         self._unread.currents = []
-        self._skipped: frozenset[int] = frozenset()  # earlier items that were not flown
-        self._old: tuple[Item, ...] = ()  # flown in the previous run
-        self._epoch, self._located_at = -1, 0  # epoch and seq of the location
-        self._until = -math.inf  # [s]
-        self._reached: tuple[Item, ...] = ()  # those of `_flown` with a REACHED
-        self._known_reached = 0  # how many had one at the last call of `_flown_items`
-        self._flown: tuple[Item, ...] = ()  # of missions that were replaced
+        self.flown.reset()
 
     def note_current(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_CURRENT, home not counted; the first one shows what was flown before."""
@@ -122,8 +98,8 @@ class Resume:
     def _credit(self, passed: tuple[Item, ...], now: float) -> None:
         """Credit items that are known to be flown."""
         if passed:
-            self._flown, self._reached = self._flown + passed, self._reached + passed
-            self._until = now + MAX_AGE
+            self.flown.add(passed)
+            self.flown.credit_until(now)
 
     def _credit_unread(self, held: tuple[Item, ...], now: float) -> None:
         """Credit each REACHED received before the mission was read, by the positions."""
@@ -192,19 +168,21 @@ class Resume:
         first = min(currents[0].seq, flown) if currents else flown
         if self._unread.began_held and self.recorded[0] is None:
             first = 0  # what was before it may be of the mission before
-        self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
+        self.flown.skipped = frozenset(
+            range(first, flown)) - self._flown_since(held, first, flown, now)
         items = held[:flown] + self._tasks.tagged(held[flown:], tasks)
         self._progress.begin(items, flown, now, read=True)
-        self._epoch, self._located_at = self._progress.epoch, flown
+        self.flown.located(flown)
         # the previous run has reported earlier items, or recorded that they were skipped
-        self._old = held[:self.recorded[1] or 0] if self.recorded[0] == checksum(held) else ()
+        self.flown.old = held[:self.recorded[1] or 0] if self.recorded[0] == checksum(held) else ()
         # on the ground with the first list: the onboard mission is of an earlier flight
         if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
-            self._until = now + MAX_AGE
+            self.flown.credit_until(now)
 
     def _begin(self, held: tuple[Item, ...], now: float) -> None:
         """Credit what the previous run has seen passed and had still to judge."""
-        self.located, self._missions = True, (*self._missions[-_MAX_MISSIONS:], held)
+        self.located = True
+        self.flown.note_mission(held)
         before = self._unread.take_passed_before(self._placed(held), self._home_of(held))
         self._credit(tuple(held[n] for n in sorted(before)), now)
         if len(self.passed) < 3 or self.recorded[0] != checksum(held):
@@ -223,10 +201,10 @@ class Resume:
                 self._placed(held), self._home_of(held), self.current_unreliable)
             self._credit(tuple(held[n] for n in sorted(passed)), now)
         if self._telemetry.airborne and self.recorded[0] is None:  # no file: taken at the start
-            flown = held[:self._unread.flown_first(len(held))]
-            self._flown, self._until = self._flown + flown, now + MAX_AGE
+            self.flown.add(held[:self._unread.flown_first(len(held))], reached=False)
+            self.flown.credit_until(now)
         self._progress.begin(held, None, now)
-        self._epoch, self._located_at = self._progress.epoch, 0
+        self.flown.located(0)
 
     def _placed(self, held: tuple[Item, ...]) -> tuple[Item, ...]:
         return tuple(with_position(item, self._origin) for item in held)
@@ -260,7 +238,8 @@ class Resume:
         current, when = min(first.seq, len(held)), first.at
         if ended:
             current, when = len(held), now
-        self._old, self._until = held[:recorded], now + MAX_AGE
+        self.flown.old = held[:recorded]
+        self.flown.credit_until(now)
         # what was passed before is judged by the positions of before
         begin = min(max(recorded, *self.passed[1:2], 0), current)
         left_unseen = self.was_in_mission and not first.flying and (
@@ -268,11 +247,10 @@ class Resume:
         flown = self._flown_since(held, begin, current, when, left_unseen)
         if arrived and current > recorded:
             flown |= {recorded}
-        passed = tuple(held[n] for n in sorted(flown))
-        self._flown, self._reached = self._flown + passed, self._reached + passed
+        self.flown.add(tuple(held[n] for n in sorted(flown)))
         items = held[:current] + self._tasks.tagged(held[current:], tasks)
         progress.begin(items, current, now, read=True)
-        self._epoch, self._located_at = progress.epoch, recorded
+        self.flown.located(recorded)
         self._replay(held, now)
 
     def _flown_since(self, held: tuple[Item, ...], begin: int, end: int, now: float,
@@ -310,83 +288,6 @@ class Resume:
         if tasks is None or not self.located:
             return held, None
         return self._tasks.tagged(held, tasks), self._progress.path.newest
-
-    def keep_flown(self) -> None:
-        """Keep the flown items of this mission before it is replaced."""
-        here = self._flown_here()
-        self._flown, self._reached = self._flown + here, self._reached + self._reached_of(here)
-
-    def flown_count(self, now: float) -> int:
-        """How many flown items and tasks are known; it changes where `flown_tasks` may."""
-        if not self._flown and self._progress.epoch != self._epoch:  # as at most calls
-            self._known_reached = 0
-            return self.seen_passed.count(now)
-        return len(self._flown_items(now)) + self.seen_passed.count(now)
-
-    def _flown_items(self, now: float) -> tuple[Item, ...]:
-        """Flown items that were not reported; none when no task can be credited any more."""
-        here = self._flown_here()
-        if not here and not self._flown:
-            self._known_reached = 0
-            return ()
-        reached = len(self._reached) + len(self._reached_of(here))
-        if reached > self._known_reached:
-            self._until = now + MAX_AGE
-        self._known_reached = reached
-        return (*self._flown, *here) if now < self._until + _NAMED_AGE * bool(self.ahead) else ()
-
-    def flown_tasks(self, tasks: Iterable[Task], now: float) -> tuple[Task, ...]:
-        """The given tasks that are among the flown items, or were seen passed before."""
-        tasks = tuple(tasks)
-        flown, seen = self._flown_items(now), self.seen_passed.among(tasks, now)
-        if not flown:
-            return seen
-        named = [task for task in tasks
-                 if now < self._until or self.ahead.get(task.id) == task.position]
-        found = []
-        for turned in (False, True):
-            stops = tuple(MissionStop(t, reversed=turned) for t in named if t.path or not turned)
-            ends = {item.task: item for item in self._tasks.items_of(stops) if item.completes}
-            found += [stop.task for stop in stops if stop.task.id in ends and any(
-                alike(ends[stop.task.id], other) and self._is_flown(stop.task, other)
-                and self._comes_along(stop, other) for other in flown)]
-        return tuple(dict.fromkeys((*seen, *found)))
-
-    def _comes_along(self, stop: MissionStop, last: Item) -> bool:
-        """Whether the items before the last one of a way are of that way; ways share points."""
-        if not stop.task.path:
-            return True
-        mission = next((each for each in self._missions if any(last is i for i in each)), ())
-        at = next((n for n, item in enumerate(mission) if item is last), 0)
-        end = with_position(last, self._origin).position
-        for item in reversed(mission[:at]):
-            place = with_position(item, self._origin).position
-            if place is not None and end is not None and math.dist(place, end) > _SAME_PLACE:
-                return segment_distance(place, *stop.way[-2:]) <= _SAME_PLACE
-        return False
-
-    def _is_flown(self, task: Task, item: Item) -> bool:
-        """Whether an item at a task's position was reached, or passed and not skipped."""
-        reached = (*self._reached, *self._reached_of(self._flown_here()))
-        if any(item is each for each in reached):
-            return True
-        return self.unflown.get(task.id) != place_of(task) and (
-            task.id in self.reported or not any(item is old for old in self._old))
-
-    def _reached_of(self, flown: tuple[Item, ...]) -> tuple[Item, ...]:
-        """Those of the flown items on board of which a REACHED was received."""
-        items = self._progress.items
-        return tuple(item for item in flown if any(
-            item is items[n] for n in self._progress.reached_seqs if n < len(items)))
-
-    def _flown_here(self) -> tuple[Item, ...]:
-        """Flown items of the onboard mission that belong to no task of the list."""
-        progress = self._progress
-        if progress.epoch != self._epoch:
-            return ()  # read again: earlier items may be of an interrupted transfer
-        return tuple(item for n, item in enumerate(progress.items[:progress.current or 0])
-                     if not item.task and item.position is None and n not in self._skipped
-                     and (n < self._located_at or n in progress.reached_seqs))
 
     def _ended(self, held: tuple[Item, ...], current: int) -> bool:
         telemetry, last = self._telemetry, held[-1]

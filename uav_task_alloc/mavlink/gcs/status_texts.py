@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When the STATUSTEXTs of a vehicle last named a failsafe, a kill or the end of a mission."""
+"""When texts of a vehicle last named a failsafe, a kill or a mission's end; its failing checks."""
 from __future__ import annotations
 
 import math
@@ -57,3 +57,18 @@ class StatusTexts:
         """Whether the mission was called finished since a time [s], or infeasible, just now."""
         finished_at = self.finished_at if self.finished_at >= since else -math.inf
         return max(finished_at, self.infeasible_at) > now - _TEXT_WINDOW
+
+def failing_checks(message: Message) -> str:
+    """Failing prearm checks of a SYS_STATUS as a text with the unhealthy sensors; '': none.
+
+    PX4 sets the health bit of the prearm check, and never its present and enabled bits.
+    """
+    prearm = d.MAV_SYS_STATUS_PREARM_CHECK
+    if message.onboard_control_sensors_health & prearm:
+        return ''
+    failing = (message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
+               & ~message.onboard_control_sensors_health & ~prearm)
+    names = [entry.name.removeprefix('MAV_SYS_STATUS_').removeprefix('SENSOR_').lower()
+             for bit, entry in d.enums['MAV_SYS_STATUS_SENSOR'].items()
+             if bit & failing and bit & (bit - 1) == 0]
+    return 'preflight checks fail' + (f' ({", ".join(names)})' if names else '')

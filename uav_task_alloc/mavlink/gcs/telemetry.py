@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.autopilots import OFF_GROUND, ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.boot_clock import BootClock
+from uav_task_alloc.mavlink.gcs.status_texts import failing_checks
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
@@ -57,6 +58,8 @@ class Telemetry:
         now: steady time [s], as in all methods.
     """
 
+    _mission_flown = True  # the mission on board was, or it is not known
+
     def __init__(self, profile: Profile, origin: Origin, now: float) -> None:
         self._profile, self._origin = profile, origin
         self.received_at = now  # [s] of the latest message
@@ -70,7 +73,7 @@ class Telemetry:
         self.altitude = math.nan  # [m] AMSL
         self.battery = math.nan  # 0..1, of the battery with least remaining
         # a PX4 in mission mode flies nothing until it is armed, as after a return
-        self.armed = self.arms_into_mission = False
+        self.armed = self.arms_into_mission = self.disarmed_since_mission = False
         self.mode, self.mode_at = ModeFunction.UNKNOWN, -math.inf  # it was set then [s]
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
@@ -201,6 +204,10 @@ class Telemetry:
         self.arms_into_mission = False
         self._mode_frame = self.frames.newest
 
+    def note_new_mission(self) -> None:
+        """Note that the vehicle has taken another mission, which it has not flown yet."""
+        self._mission_flown = self.disarmed_since_mission = False
+
     def _set_mode(self, mode: ModeFunction, now: float) -> None:
         if mode is not self.mode:
             self.mode, self.mode_at = mode, now
@@ -272,6 +279,10 @@ class Telemetry:
         self.arms_into_mission = (
             mode is ModeFunction.MISSION and self._profile.atomic and not self.armed)
         self._set_mode(ModeFunction.HOLD if self.arms_into_mission else mode, now)
+        if not self.armed:
+            self.disarmed_since_mission = self._mission_flown
+        elif mode is ModeFunction.MISSION:
+            self._mission_flown, self.disarmed_since_mission = True, False
         self._mode_frame = self.frame
         self._landed(self.landed)
         if self.mode is ModeFunction.MISSION:
@@ -342,7 +353,7 @@ class Telemetry:
             self.battery = least
 
     def _sys_status(self, message: Message, now: float) -> None:
-        self.unhealthy = unhealthy(message)
+        self.unhealthy = failing_checks(message)
         if message.battery_remaining >= 0 and not any(
                 now - at < _BATTERY_TIMEOUT for _, at in self._batteries.values()):
             self.battery = message.battery_remaining / 100.0
@@ -375,19 +386,3 @@ class Telemetry:
 
     def _reached(self, message: Message, now: float) -> None:
         self.reached = message.seq
-
-
-def unhealthy(message: Message) -> str:
-    """Failing prearm checks of a SYS_STATUS as a text with the unhealthy sensors; '': none.
-
-    PX4 sets the health bit of the prearm check, and never its present and enabled bits.
-    """
-    prearm = d.MAV_SYS_STATUS_PREARM_CHECK
-    if message.onboard_control_sensors_health & prearm:
-        return ''
-    failing = (message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
-               & ~message.onboard_control_sensors_health & ~prearm)
-    names = [entry.name.removeprefix('MAV_SYS_STATUS_').removeprefix('SENSOR_').lower()
-             for bit, entry in d.enums['MAV_SYS_STATUS_SENSOR'].items()
-             if bit & failing and bit & (bit - 1) == 0]
-    return 'preflight checks fail' + (f' ({", ".join(names)})' if names else '')

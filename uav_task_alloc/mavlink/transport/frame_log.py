@@ -8,6 +8,8 @@ from collections.abc import Iterable
 
 _KEPT = 1024  # frames
 _SILENCE = 1.0  # [s] after which sequence numbers may have wrapped: frames are missing
+_FEW = 64  # frames expected in a silence, at most, where they cannot have wrapped
+_MARKS = 8  # seconds in which frames were received, for their rate
 
 
 class FrameLog:
@@ -22,6 +24,7 @@ class FrameLog:
     def __init__(self) -> None:
         self.newest = 0  # the number of the newest frame
         self._known, self._at = False, 0.0
+        self._marks: deque[tuple[float, int]] = deque(maxlen=_MARKS)  # time [s], newest number
         self._order: deque[int] = deque()
         self._received: set[int] = set()
 
@@ -37,17 +40,26 @@ class FrameLog:
         """
         if not self._known:
             self._known, self.newest = True, seq
-        elif now - self._at > _SILENCE:
+        elif now - self._at > _SILENCE and not self._expected(now - self._at) < _FEW:
             self.newest += 256
         self._at = now
         number = self.newest + (seq - self.newest + 128) % 256 - 128
         self.newest = max(self.newest, number)
+        if not self._marks or now - self._marks[-1][0] >= 1.0:
+            self._marks.append((now, self.newest))
         if number not in self._received:
             self._received.add(number)
             self._order.append(number)
             if len(self._order) > _KEPT:
                 self._received.discard(self._order.popleft())
         return number
+
+    def _expected(self, seconds: float) -> float:
+        """How many frames were sent in a silence [s], by the rate before; inf: not known."""
+        if len(self._marks) < _MARKS:
+            return math.inf
+        (begin, first), (end, last) = self._marks[0], self._marks[-1]
+        return seconds * (last - first) / (end - begin)
 
     @property
     def first(self) -> int:
@@ -71,5 +83,6 @@ class FrameLog:
     def clear(self) -> None:
         """Reset after a restart of the vehicle."""
         self._known = False
+        self._marks.clear()
         self._order.clear()
         self._received.clear()
