@@ -32,3 +32,10 @@ def test_a_silence_in_which_the_numbers_may_have_wrapped_has_missing_frames(rate
 def test_a_silence_at_an_unknown_rate_has_missing_frames():
     log, now, newest = log_of(14.0, 3.0)
     assert log.note((newest + 1) % 256, now + 2.0) == newest + 257
+
+
+def test_a_silence_lasts_through_frames_that_come_late():
+    log, now, newest = log_of(14.0, 20.0)
+    for at, late in ((2.0, 34), (3.9, 15)):
+        assert log.note((newest - late) % 256, now + at) == newest - late
+    assert log.note((newest + 170) % 256, now + 11.2) == newest + 170

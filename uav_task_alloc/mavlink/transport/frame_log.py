@@ -24,6 +24,7 @@ class FrameLog:
     def __init__(self) -> None:
         self.newest = 0  # the number of the newest frame
         self._known, self._at = False, 0.0
+        self._newest_at = 0.0  # [s] at which the newest frame was received
         self._marks: deque[tuple[float, int]] = deque(maxlen=_MARKS)  # time [s], newest number
         self._order: deque[int] = deque()
         self._received: set[int] = set()
@@ -39,14 +40,16 @@ class FrameLog:
             The unbounded frame number.
         """
         if not self._known:
-            self._known, self.newest = True, seq
-        elif now - self._at > _SILENCE and not self._expected(now - self._at) < _FEW:
-            self.newest += 256
+            self._known, self.newest, self._newest_at = True, seq, now
+        elif (silence := now - self._newest_at) > _SILENCE and not (
+                self._expected(silence) < _FEW):
+            self.newest, self._newest_at = self.newest + 256, now
         self._at = now
         number = self.newest + (seq - self.newest + 128) % 256 - 128
-        self.newest = max(self.newest, number)
-        if not self._marks or now - self._marks[-1][0] >= 1.0:
-            self._marks.append((now, self.newest))
+        if number >= self.newest:
+            self.newest, self._newest_at = number, now
+            if not self._marks or now - self._marks[-1][0] >= 1.0:
+                self._marks.append((now, number))
         if number not in self._received:
             self._received.add(number)
             self._order.append(number)
