@@ -84,7 +84,7 @@ class FlownItems:
         self._flown, self._reached = self._flown + here, self._reached + self._reached_of(here)
 
     def count(self, now: float) -> int:
-        """How many flown items and tasks are known; it changes where `flown_tasks` may."""
+        """How many flown items and tasks are known; it changes where `tasks_among` may."""
         if not self._flown and self._progress.epoch != self._epoch:  # as at most calls
             self._known_reached = 0
             return self.seen_passed.count(now)

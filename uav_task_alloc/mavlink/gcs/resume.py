@@ -40,7 +40,6 @@ def checksum(items: Iterable[Item]) -> int:
 class Resume:
     """Locates a vehicle in its onboard mission once, and credits the items it has flown.
 
-
     Args:
         profile: of its autopilot.
         origin: of the local ENU frame.
