@@ -152,6 +152,16 @@ def test_disarmed_at_its_last_item_the_mission_begins_again(bench, flown):
     assert current(bench).seq == 0
 
 
+def test_a_mission_that_ends_on_the_ground_ends_once_and_stays_in_mission_mode(bench):
+    bench.load(item(d.MAV_CMD_DO_CHANGE_SPEED, frame=2, p1=1.0, p2=5.0))
+    bench.set_mode(FlightMode.MISSION)
+    assert bench.arm() == 0
+    bench.pass_time(3.0)
+    assert bench.flight.mode is FlightMode.MISSION
+    ends = [event for event in bench.vehicle.take_events() if event.name == 'mission_end']
+    assert len(ends) == 1
+
+
 def test_disarmed_before_its_last_item_the_mission_goes_on(bench):
     bench.fly(waypoint(A), waypoint(B), waypoint(C))
     bench.reach(0)

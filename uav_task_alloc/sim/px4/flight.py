@@ -165,6 +165,8 @@ class Px4Flight(VehicleFlight):
                 self.set_mode(FlightMode.HOLD)
 
     def next_item(self) -> None:
+        if self._finished:
+            return  # on the ground it stays in mission mode
         item = self.items[self.seq]
         if item.command in item_.AT_ONCE:
             self.execute(item)
