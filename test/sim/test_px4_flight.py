@@ -152,6 +152,19 @@ def test_disarmed_at_its_last_item_the_mission_begins_again(bench, flown):
     assert current(bench).seq == 0
 
 
+@pytest.mark.parametrize('mode', [FlightMode.RETURN, FlightMode.LAND])
+def test_it_does_not_arm_in_a_mode_that_only_comes_down(bench, mode):
+    bench.set_mode(mode)
+    assert bench.arm() == d.MAV_RESULT_TEMPORARILY_REJECTED
+    assert not bench.flight.armed
+    bench.received.clear()
+    bench.pass_time(1.5)
+    status = of(bench.received, 'SYS_STATUS')[-1]
+    assert not status.onboard_control_sensors_health & d.MAV_SYS_STATUS_PREARM_CHECK
+    bench.set_mode(FlightMode.HOLD)
+    assert bench.arm() == d.MAV_RESULT_ACCEPTED
+
+
 def test_a_mission_that_ends_on_the_ground_ends_once_and_stays_in_mission_mode(bench):
     bench.load(item(d.MAV_CMD_DO_CHANGE_SPEED, frame=2, p1=1.0, p2=5.0))
     bench.set_mode(FlightMode.MISSION)

@@ -182,6 +182,21 @@ def test_a_px4_is_not_armed_in_mission_mode_after_a_return(kind, relaunch):
     assert [event.mode for event in events[:armed] if event.name == 'mode'][-1] == MODES[kind].hold
 
 
+@PX4
+@pytest.mark.parametrize('mode', ['rtl', 'land'])
+def test_a_px4_that_was_set_to_a_mode_without_arming_on_the_ground_is_set_to_hold_first(
+        kind, mode):
+    bench = AuthorityBench(kind).discover()
+    vehicle = bench.vehicles[1]
+    vehicle.rc_mode(getattr(MODES[kind], mode))
+    assert not vehicle.rc_arm(True)
+    bench.run(limit=10.0)
+    bench.assign(task_list('A'))
+    assert bench.hand_over() == ''
+    assert bench.run(lambda: bench.completed() == ['A'], 120.0)
+    assert not [note for note in bench.notes if note.startswith('arm')]
+
+
 # arming by others
 
 @PX4

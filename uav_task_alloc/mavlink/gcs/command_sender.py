@@ -83,6 +83,19 @@ class CommandSender:
         return (telemetry.mode is ModeFunction.MISSION and telemetry.airborne
                 and telemetry.landed != d.MAV_LANDED_STATE_ON_GROUND)
 
+    @property
+    def _needs_hold(self) -> bool:
+        """Whether HOLD comes before arming and climbing.
+
+        ArduPilot does both in GUIDED. PX4 climbs from any mode, and does not arm in Return or Land.
+        """
+        telemetry, profile = self._telemetry, self._profile
+        if ModeFunction.HOLD not in profile.set_mode:
+            return False
+        climbs = profile.amsl_takeoff and telemetry.armed
+        return telemetry.arms_into_mission or (
+            telemetry.mode is not ModeFunction.HOLD and not climbs)
+
     def drop(self) -> None:
         """Drop the open command and its state: another party controls the vehicle."""
         self._command = self._arming_since = None
@@ -256,9 +269,7 @@ class CommandSender:
         if not telemetry.grounded or not telemetry.has_position:
             self.waits_for = 'a position' if telemetry.grounded else 'its landed state'
             return []
-        if ModeFunction.HOLD in self._profile.set_mode and (
-                telemetry.arms_into_mission or (  # ArduPilot arms and climbs in GUIDED
-                    telemetry.mode is not ModeFunction.HOLD and not self._profile.amsl_takeoff)):
+        if self._needs_hold:
             return self.set_mode(ModeFunction.HOLD, now)
         if not telemetry.armed:
             self.armed_here = False

@@ -79,6 +79,11 @@ class Px4Flight(VehicleFlight):
                 self._activate()
         return done
 
+    def prearm_refusal(self) -> str:
+        if self.mode in _KEEPS_DISARMED:
+            return 'Mode not suitable for arming'
+        return super().prearm_refusal()
+
     def disarm(self, force: bool = False) -> bool:
         was_armed, done = self.armed, super().disarm(force)
         if was_armed and not self.armed:
