@@ -5,8 +5,11 @@ from flight_bench import FlightBench, Store, places
 from mission_bench import task_list
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
+from uav_task_alloc.model import Task
 
 NAMES = 'ABC'
+ROW = {name: (60.0 * k, 100.0, 50.0) for k, name in enumerate('ABCD')}  # on a straight line
 
 
 class Killed(BaseException):
@@ -94,3 +97,46 @@ def test_killed_at_any_write_each_task_is_flown_once_and_reported(kind, before, 
         assert bench.fly() == list(NAMES), f'write {write}'
         killed = bench.killed
     assert write > len(NAMES)
+
+
+class TurnedBench(KilledBench):
+    """Its list is turned around where it nears the second place of a row, which it passes."""
+
+    def __init__(self, kind, write, before, down, near):
+        self.near, self.turns_at_write = near, write
+        super().__init__(kind, 10**9, before, down, 0.0)
+
+    def reached(self):
+        """The places reached, in order."""
+        return [name for e in self.truth[1] if e.name == 'item_reached'
+                for name, place in ROW.items() if abs(place[0] - e.point[0]) < 3.0]
+
+    def _collect(self):
+        FlightBench._collect(self)
+        self.done += [task for task in self.completed() if task not in self.done]
+        assert set(self.done) <= set(self.reached())
+
+    def allocate(self):
+        if self.near is not None and 'A' in self.done and (
+                ROW['B'][0] - self.vehicles[1].flight.body.position[0] <= self.near):
+            self.near, self.store.writes_left = None, self.turns_at_write
+        left = [name for name in ROW if name not in self.done]
+        if self.ground_station.sessions and left[::1 if self.near else -1] != self.listed:
+            self.listed, self.revision = left[::1 if self.near else -1], self.revision + 1
+            self.guard(lambda: self.assign(TaskList(self.revision, tuple(
+                MissionStop(Task(name, ROW[name]), ()) for name in self.listed), False)))
+        return not left
+
+
+@pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+@pytest.mark.parametrize('before', [True, False])
+@pytest.mark.parametrize(('near', 'down'), [(3.0, 0.0), (10.0, 15.0)])
+def test_killed_at_any_write_of_a_replacement_no_task_is_flown_twice(kind, before, near, down):
+    write, killed = 0, True
+    while killed:
+        write += 1
+        bench = TurnedBench(kind, write, before, down, near)
+        bench.fly()
+        assert sorted(bench.reached()) == list(ROW), f'write {write}'
+        killed = bench.killed
+    assert write > len(ROW)

@@ -4,7 +4,7 @@ import pytest
 from authority_bench import BOTH, flying
 from evidence_bench import SPEED, Flight
 
-from uav_task_alloc.mavlink.mission.flown_path import PositionSample
+from uav_task_alloc.mavlink.mission.flown_path import FlownPath, PositionSample, Visit
 
 
 def on_first_leg(x, repeats=True, **tasks):
@@ -33,6 +33,18 @@ def test_a_gap_after_the_mission_was_left_is_no_evidence(left_at, known):
     flight.table.note_current(1, flight.now, False, flight.frame())
     flight.stay(8.0)
     assert ('A' in flight.table.completed) is known
+
+
+@pytest.mark.parametrize('gap_first', [True, False])
+def test_a_position_at_the_end_of_a_gap_shows_where_it_was(gap_first):
+    path, still = FlownPath(), (0.0, 0.0, 0.0)
+    path.add(PositionSample(10.0, (0.0, 0.0, 50.0), still))
+    path.add(PositionSample(20.0, (60.0, 0.0, 50.0), still))
+    there, elsewhere = ((0.0, 60.0) if gap_first else (60.0, 0.0))
+    since, until = (5.0, 15.0) if gap_first else (15.0, 25.0)
+    assert path.visited((there, 1.0, 50.0), 2.0, 0.0, since, until) is Visit.YES
+    assert path.visited((elsewhere, 1.0, 50.0), 2.0, 0.0, since, until) is Visit.UNOBSERVED
+    assert path.visited((30.0, 0.0, 50.0), 2.0, 0.0, since, until) is Visit.UNOBSERVED
 
 
 @pytest.mark.parametrize(('reports', 'current'), [(1, 2), (2, 0)])

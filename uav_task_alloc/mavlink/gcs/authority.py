@@ -230,7 +230,9 @@ class AuthorityRecord:
     # items passed and still to be judged: index of the first one and after the last one, whether
     # it has left mission mode unseen since (0 no, 1 yes, 2 perhaps), indices where it was seen
     passed: tuple[int, ...] = ()
-    uploading: tuple[int, ...] = ()  # checksum of a mission being uploaded, index of its start
+    # checksum of a mission being uploaded, or whose current item is still to be set, and index of
+    # its start; with it the current item may be of the mission before
+    uploading: tuple[int, ...] = ()
     # vehicle time [s], position [m] and velocity [m/s], both ENU, of one to three recent positions
     seen: tuple[float, ...] = ()
     # 0..1, at its own landing or on its way down over its home, while it may start again

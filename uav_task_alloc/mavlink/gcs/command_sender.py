@@ -87,7 +87,7 @@ class CommandSender:
     def _needs_hold(self) -> bool:
         """Whether HOLD comes before arming and climbing.
 
-        ArduPilot does both in GUIDED. PX4 climbs from any mode, and does not arm in Return or Land.
+        ArduPilot does both in GUIDED. PX4 climbs from any mode; it does not arm in Return or Land.
         """
         telemetry, profile = self._telemetry, self._profile
         if ModeFunction.HOLD not in profile.set_mode:

@@ -9,7 +9,6 @@ from uav_task_alloc.mavlink.gcs.authority import TaskMark
 from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.resume import checksum
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
-from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import Item, alike
 from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
 
@@ -22,12 +21,13 @@ class MissionEvidence:
     Args:
         onboard: the mission of the vehicle.
         telemetry: of the vehicle.
+        atomic: whether a new mission is flown from its own first item, without a command (PX4).
     """
 
-    def __init__(self, onboard: OnboardMission, telemetry: Telemetry) -> None:
-        self._onboard, self._telemetry = onboard, telemetry
+    def __init__(self, onboard: OnboardMission, telemetry: Telemetry, atomic: bool) -> None:
+        self._onboard, self._telemetry, self._atomic = onboard, telemetry, atomic
         self._checksum: tuple[tuple[Item, ...], int] | None = None
-        self._uploading: tuple[MissionDiff, int] | None = None
+        self._uploading: tuple[tuple[Item, ...], int] | None = None  # and their checksum
         self._ahead: tuple[tuple[Item, ...], int | None, tuple[TaskMark, ...]] = (), None, ()
 
     def ended(self, since: float) -> bool:
@@ -157,10 +157,12 @@ class MissionEvidence:
         return (*passed, *(mark for mark in ahead if all(mark.task != p.task for p in passed)))
 
     def uploading(self) -> tuple[int, ...]:
-        """Checksum of a mission that may be stored next, and index of its first item; ()."""
-        diff = self._onboard.unknown_upload
-        if diff is None:
+        """`AuthorityRecord.uploading`; () where the current item is of the mission on board."""
+        onboard, diff = self._onboard, self._onboard.unknown_upload
+        items, start = (diff.items, diff.start) if diff is not None else (
+            onboard.progress.items, None if self._atomic else onboard.set_current_to)
+        if start is None:
             return ()
-        if self._uploading is None or self._uploading[0] is not diff:
-            self._uploading = diff, checksum(diff.items)
-        return self._uploading[1], diff.start
+        if self._uploading is None or self._uploading[0] is not items:
+            self._uploading = items, checksum(items)
+        return self._uploading[1], start

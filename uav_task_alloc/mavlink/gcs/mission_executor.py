@@ -80,7 +80,7 @@ class MissionExecutor:
         self.sender = CommandSender(peer, profile, self.telemetry)
         self.onboard.list.leg.locate = self._leg_start
         self.onboard.list.zones = lambda: self.policy.zones
-        evidence = MissionEvidence(self.onboard, self.telemetry)
+        evidence = MissionEvidence(self.onboard, self.telemetry, profile.atomic)
         self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)
         self.authority = self.watch.authority

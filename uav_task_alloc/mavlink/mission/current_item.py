@@ -213,10 +213,16 @@ class CurrentItem:
             self._finished_frame = self._frames.newest
         return frame is not None and frame > self._finished_frame
 
-    def _fly_from(self, seq: int, now: float) -> None:
-        """Set the current item, which may be flown since before the message arrived."""
+    def _fly_from(self, seq: int, now: float, earliest: float = -math.inf) -> None:
+        """Set the current item, which may be flown since before the message arrived.
+
+        Args:
+            seq: index without home.
+            now: steady time [s] at which that was received.
+            earliest: vehicle time [s] until which another item was.
+        """
         epoch = self._epoch
-        epoch.current, epoch.since = seq, self._positions.recent(epoch.since, now)
+        epoch.current, epoch.since = seq, self._positions.recent(max(epoch.since, earliest), now)
 
     def _move(self, seq: int, now: float, flying: bool, frame: int | None) -> None:
         epoch = self._epoch
@@ -228,9 +234,9 @@ class CurrentItem:
                     self.set_back_from = epoch.current, now
                 epoch.current = seq  # set by another station; nothing is flown
         elif epoch.current is not None and epoch.current < seq <= len(epoch.items):
-            self._after_skipped = None
+            self._after_skipped, until = None, self._reported_until(epoch.current)
             self.claim(epoch.current, seq, now, frame)
-            self._fly_from(seq, now)
+            self._fly_from(seq, now, until)
             self.set_by_other = seq if self._after_skipped == seq else self.set_by_other
 
     def note_mission_complete(self, seq: int, now: float, frame: int | None = None) -> None:

@@ -245,10 +245,12 @@ class FlownPath:
         away = [math.dist(sample.position, point) for sample in samples]
         for (a, b), (from_a, from_b) in zip(pairwise(samples), pairwise(away), strict=True):
             gap = b.t - a.t
-            if gap > GAP or b.t < since or min(from_a, from_b) > near + 5.0 + 30.0 * gap:
+            if b.t < since or min(from_a, from_b) > near + 5.0 + 30.0 * gap:
                 continue
-            reach = near + _CURVE * gap * gap
+            reach = near + _CURVE * gap * gap * (gap <= GAP)
             for k, (share, place) in enumerate(zip(_SHARES, _between(a, b), strict=True)):
+                if gap > GAP and 0 < k < _PIECES:
+                    continue  # of a gap only its ends are known
                 t = a.t + gap * k / _PIECES
                 if since <= t <= until and math.dist(place, point) <= reach:
                     first = min(first, t)
