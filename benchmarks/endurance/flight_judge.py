@@ -201,7 +201,8 @@ class Judge:
             self._set_at = event.t
             self._evidence.set_by_other(event.t)
         elif event.name == 'mission_restart':
-            self._note_begun(event, by_arming=self.world.vehicle.flight.landed)
+            # armed in mission mode it takes off within the tick
+            self._note_begun(event, event.t == self._armed_at or self.world.vehicle.flight.landed)
         elif event.name == 'mission_end':
             self._ended = True
         elif event.name == 'command' and event.cause == OURS:

@@ -58,6 +58,7 @@ def judged(rows, hand_over_at=-1.0, late=0.0, kind='px4'):
             for name, cause, mode in events]
         for name, _, _ in events:
             flight.armed = {'armed': True, 'disarmed': False}.get(name, flight.armed)
+            flight.landed &= name != 'takeoff'
         if now == hand_over_at:
             judge.handed_back(by_service=True)
             flight.landed = False
@@ -183,7 +184,8 @@ def test_a_mission_of_a_px4_that_an_arming_begins_again_is_flown_for_who_armed(
         (1.0, [('armed', OURS, None), ('item_reached', 'A', None)], heartbeat(True), None),
         (1.1, [], d.MAVLink_mission_item_reached_message(0), None),
         (2.0, [('item_reached', 'B', None)], None, None),
-        (3.0, [('armed', cause, None), ('mission_restart', cause, None)], None, None),
+        (3.0, [('armed', cause, None), ('mission_restart', cause, None), ('takeoff', '', None)],
+         None, None),
         (4.0, [], heartbeat(True), None), (7.0, [], heartbeat(True), None),
         (9.0, [('item_reached', 'A', None)], None, None)],
         hand_over_at=7.0 if handed_over else -1.0)
