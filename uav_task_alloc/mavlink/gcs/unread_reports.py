@@ -172,6 +172,23 @@ class UnreadReports:
         self._earlier = []
         return reached
 
+    def take_of_replaced(self, seq: int, count: int) -> bool:
+        """Take each REACHED of the item that a PX4 flew until its mission was replaced.
+
+        Args:
+            seq: index of that item.
+            count: number of items on board now; by its reports it has not come past `seq` there.
+
+        Returns:
+            Whether there is one.
+        """
+        now_at = max((each.seq for each in self.currents if each.total == count), default=count)
+        named = self._repeats and any(each.seq == seq for each in self._reached)
+        if not named or now_at > seq or now_at == count - 1:
+            return False
+        self._reached = [each for each in self._reached if each.seq != seq]
+        return True
+
     def passed(self, held: tuple[Item, ...], home: Point | None,
                while_current: bool = False) -> set[int]:
         """Return the items that it was seen to pass in mission mode.

@@ -174,7 +174,7 @@ class ProgressTable:
         if (epoch.items or read) and not all_alike(epoch.items, items):
             self._epochs.begin(PreviousEpoch(
                 epoch.items, epoch.since, self.positions.vehicle_time(now), self.may_end(now),
-                now + REPEAT_WINDOW, epoch.taken, epoch.returning))
+                now + REPEAT_WINDOW, epoch.taken, epoch.returning, self.reports.reported))
             self.coverage.note_replaced(
                 items[start] if start is not None and start < len(items) else None)
         epoch.items, epoch.current = items, start

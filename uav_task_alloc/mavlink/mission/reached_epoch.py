@@ -33,6 +33,7 @@ class PreviousEpoch:
     until: float  # [s] until when a REACHED may be of it
     taken: float = -math.inf  # vehicle time [s] before which it was not on board
     returning: bool = False  # the item that returns was next, or was being flown
+    reported: int | None = None  # the current item last reported
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +140,11 @@ class ReachedEpoch:
         if after is not None and not same and (
                 positions.distance(after) <= LOOSE_RADIUS + after.radius):
             return None  # perhaps of the current epoch
-        since = max(before.since, positions.path.newest - REPEAT_WINDOW)
-        if positions.was_at(item, since, before.end) or positions.near_one(
+        since, until = max(before.since, positions.path.newest - REPEAT_WINDOW), before.end
+        if before.reported is not None and before.reported < min(seq + 1, len(before.items) - 1):
+            # not shown to be past it: a repetition of earlier is not of where it came since
+            until = min(until, positions.vehicle_time(when))
+        if positions.was_at(item, since, until) or positions.near_one(
                 item, None if same else after, when, before.end):
             return item
         return None
