@@ -34,6 +34,7 @@ class UnreadCurrent(NamedTuple):
     complete: bool  # with the report that the mission is flown to its end
     total: int | None = None  # items of the mission that it reported to fly; None: it did not
     holding: bool = False  # in the mode in which the bridge has it wait, as for an upload
+    stored: int | None = None  # items of the mission on board; None: not reported
 
 
 @dataclass(slots=True)
@@ -102,7 +103,7 @@ class UnreadReports:
             self.currents.append(UnreadCurrent(
                 seq, now, frame, self._telemetry.in_mission,
                 self._telemetry.mission_state == d.MISSION_STATE_COMPLETE, self._count_flown(),
-                self._telemetry.mode is ModeFunction.HOLD))
+                self._telemetry.mode is ModeFunction.HOLD, self._telemetry.total))
         for reached in self._reached:
             if frame > reached.frame:
                 reached.current_after = max(seq, reached.current_after or 0)
@@ -175,6 +176,8 @@ class UnreadReports:
     def take_of_replaced(self, seq: int, count: int) -> bool:
         """Take each REACHED of the item that a PX4 flew until its mission was replaced.
 
+        MISSION_CURRENT of that mission are dropped.
+
         Args:
             seq: index of that item.
             count: number of items on board now; by its reports it has not come past `seq` there.
@@ -182,6 +185,10 @@ class UnreadReports:
         Returns:
             Whether there is one.
         """
+        if self._repeats:
+            of_before = [n for n, each in enumerate(self.currents)
+                         if each.stored not in (None, count)]
+            self.currents = self.currents[max(of_before, default=-1) + 1:]
         now_at = max((each.seq for each in self.currents if each.total == count), default=count)
         named = self._repeats and any(each.seq == seq for each in self._reached)
         if not named or now_at > seq or now_at == count - 1:
