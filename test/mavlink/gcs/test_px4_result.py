@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """PX4 reports its mission as complete after a take-off and a landing: that completes no task."""
+import math
+
+import pytest
 from authority_bench import MODES, flying as authority_flying
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
@@ -96,3 +99,17 @@ def test_a_take_off_after_a_landing_is_no_flight_in_which_the_mission_can_have_e
     assert not telemetry.airborne_since_mission
     assert bench.run(lambda: bench.completed() == ['A'])
     assert telemetry.airborne_since_mission
+
+
+@pytest.mark.parametrize('wait', [3.8, 3.9])
+def test_a_landing_just_before_the_end_of_a_service_completes_no_task(wait):
+    bench = flying('px4', 'A', service=4.0)
+    vehicle = bench.vehicles[1]
+    body, (x, y, _) = vehicle.flight.body, task_list('A').stops[0].task.position
+    assert bench.run(lambda: math.dist(body.position[:2], (x, y)) < 2.0)
+    bench.run(limit=wait)
+    assert places(bench) == []
+    vehicle.failsafe('ekf', MODES['px4'].land)  # no position is valid from here on
+    assert bench.run(lambda: not vehicle.flight.armed, 60.0)
+    bench.run(limit=10.0)
+    assert bench.completed() == []

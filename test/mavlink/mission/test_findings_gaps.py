@@ -47,18 +47,6 @@ def test_a_position_at_the_end_of_a_gap_shows_where_it_was(gap_first):
     assert path.visited((30.0, 0.0, 50.0), 2.0, 0.0, since, until) is Visit.UNOBSERVED
 
 
-def test_of_two_items_passed_the_first_was_flown_in_a_gap_that_ended_before_the_second():
-    flight = on_first_leg(60.0, A=100.0, B=200.0, C=300.0)
-    flight.lost = True
-    flight.fly_to(150.0)
-    flight.lost = False
-    flight.fly_to(196.0)
-    flight.table.note_current(2, flight.now, True, flight.frame())
-    flight.fly_to(250.0)
-    flight.stay(8.0)
-    assert 'A' in flight.table.completed
-
-
 @pytest.mark.parametrize(('reports', 'current'), [(1, 2), (2, 0)])
 def test_a_mission_that_begins_again_after_its_end_is_known_by_the_second_report(reports, current):
     flight = Flight()

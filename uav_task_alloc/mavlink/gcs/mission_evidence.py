@@ -11,6 +11,7 @@ from uav_task_alloc.mavlink.gcs.resume import checksum
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import Item, alike
 from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
+from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 
 _AHEAD = 10  # tasks that are recorded: more are not flown before a bridge is started again
 
@@ -158,11 +159,19 @@ class MissionEvidence:
 
     def uploading(self) -> tuple[int, ...]:
         """`AuthorityRecord.uploading`; () where the current item is of the mission on board."""
-        onboard, diff = self._onboard, self._onboard.unknown_upload
-        items, start = (diff.items, diff.start) if diff is not None else (
-            onboard.progress.items, None if self._atomic else onboard.set_current_to)
+        items, start = self._onboard.progress.items, self._unset_start()
+        if (diff := self._onboard.unknown_upload) is not None:
+            items, start = diff.items, diff.start
         if start is None:
             return ()
         if self._uploading is None or self._uploading[0] is not items:
             self._uploading = items, checksum(items)
         return self._uploading[1], start
+
+    def _unset_start(self) -> int | None:
+        """The item to be set on an ArduPilot whose current item may be of the mission before."""
+        onboard = self._onboard
+        if self._atomic or onboard.set_current_to is not None:
+            return None if self._atomic else onboard.set_current_to
+        intact = onboard.stored is MissionState.VERIFIED
+        return None if intact else onboard.progress.current or 0

@@ -187,7 +187,8 @@ class OnboardMission:
         if (kind := message.get_type()) in ('MISSION_ACK', 'MISSION_COUNT'):
             self.mission.note_mission_id(message)
         elif kind == 'MISSION_CURRENT' and self._profile.atomic:
-            self.progress.end_before_restart.note_current(message, now)
+            self.progress.end_before_restart.note_current(
+                message, now, self._telemetry.ends_by_mission)
         out = self.upload.receive(message, now)
         if not self.upload.may_be_stored:
             if self.upload.busy and self._unconfirmed is None:

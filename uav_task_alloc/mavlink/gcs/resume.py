@@ -218,11 +218,6 @@ class Resume:
         upload = self.recorded_upload
         if len(upload) != 2 or not upload[0] == checksum(held) != self.recorded[0]:
             return False
-        recorded, ahead = self.recorded[1], next(iter(self.flown.ahead.items()), None)
-        if recorded is not None and ahead is not None and self._unread.take_of_replaced(
-                recorded, len(held)) and self._progress.path.visited_at(
-                    ahead[1], LOOSE_RADIUS, -math.inf) is not None:
-            self.flown.seen_passed.add(*ahead)  # the task that the mission before was flying
         self.recorded, self.passed = (upload[0], upload[1], False), ()
         return True
 

@@ -132,6 +132,12 @@ class Telemetry:
         return self.airborne and not self._landed_since_mission
 
     @property
+    def ends_by_mission(self) -> bool:
+        """Whether an end that PX4 reports can only be that of its mission."""
+        return self.airborne_since_mission and (
+            self.mode not in (ModeFunction.LAND, ModeFunction.TAKEOFF))
+
+    @property
     def grounded(self) -> bool:
         """Known to be on the ground; both this and `airborne` are False if it is unknown."""
         return not self.armed or (self.landed == d.MAV_LANDED_STATE_ON_GROUND

@@ -34,7 +34,6 @@ class UnreadCurrent(NamedTuple):
     complete: bool  # with the report that the mission is flown to its end
     total: int | None = None  # items of the mission that it reported to fly; None: it did not
     holding: bool = False  # in the mode in which the bridge has it wait, as for an upload
-    stored: int | None = None  # items of the mission on board; None: not reported
 
 
 @dataclass(slots=True)
@@ -86,6 +85,7 @@ class UnreadReports:
         self._telemetry, self._positions, self._repeats = telemetry, positions, repeats
         self.currents: list[UnreadCurrent] = []
         self._reached: list[UnreadReached] = []
+        self._stored: int | None = None  # items on board by the newest report of that
         # of before a restart of the vehicle, whose clock starts again
         self._before: tuple[list[UnreadCurrent], PositionHistory] | None = None
         self._earlier: list[UnreadCurrent] = []  # of before it, until each REACHED was judged
@@ -103,11 +103,19 @@ class UnreadReports:
             self.currents.append(UnreadCurrent(
                 seq, now, frame, self._telemetry.in_mission,
                 self._telemetry.mission_state == d.MISSION_STATE_COMPLETE, self._count_flown(),
-                self._telemetry.mode is ModeFunction.HOLD, self._telemetry.total))
+                self._telemetry.mode is ModeFunction.HOLD))
+        self._drop_replaced()
         for reached in self._reached:
             if frame > reached.frame:
                 reached.current_after = max(seq, reached.current_after or 0)
         self._place(now)
+
+    def _drop_replaced(self) -> None:
+        """Drop each REACHED of a PX4 whose mission was replaced since, by its number of items."""
+        before, stored = self._stored, self._telemetry.total
+        self._stored = before if stored is None else stored
+        if self._repeats and before not in (None, self._stored):
+            self._reached.clear()
 
     def _count_flown(self) -> int | None:
         """How many items the mission has that the newest MISSION_CURRENT reports to be flown."""
@@ -172,29 +180,6 @@ class UnreadReports:
         self._reached.clear()
         self._earlier = []
         return reached
-
-    def take_of_replaced(self, seq: int, count: int) -> bool:
-        """Take each REACHED of the item that a PX4 flew until its mission was replaced.
-
-        MISSION_CURRENT of that mission are dropped.
-
-        Args:
-            seq: index of that item.
-            count: number of items on board now; by its reports it has not come past `seq` there.
-
-        Returns:
-            Whether there is one.
-        """
-        if self._repeats:
-            of_before = [n for n, each in enumerate(self.currents)
-                         if each.stored not in (None, count)]
-            self.currents = self.currents[max(of_before, default=-1) + 1:]
-        now_at = max((each.seq for each in self.currents if each.total == count), default=count)
-        named = self._repeats and any(each.seq == seq for each in self._reached)
-        if not named or now_at > seq or now_at == count - 1:
-            return False
-        self._reached = [each for each in self._reached if each.seq != seq]
-        return True
 
     def passed(self, held: tuple[Item, ...], home: Point | None,
                while_current: bool = False) -> set[int]:

@@ -47,7 +47,7 @@ class EndBeforeRestart:
         item = (
             None if current is None or current >= len(epoch.items) else epoch.items[current])
         self._ending, self._at_end = None, False
-        if item is not None and current is not None and self._flies and self._may_reach(item):
+        if item is not None and current is not None and self._flies(now) and self._may_reach(item):
             self._ending = current, item, now + MAX_MESSAGE_DELAY
             self._named = series.named_lately(current, current + 1, now)
             self._at_end = current == epoch.last_flown and self._is_at(item)
@@ -65,12 +65,11 @@ class EndBeforeRestart:
         return self._is_at(item) or (item.position is not None and self._positions.path.approached(
             item.position, item.radius, -math.inf, math.inf))
 
-    @property
-    def _flies(self) -> bool:
-        """Whether it is in mission mode, or was until a moment ago."""
-        left_at = self._moves.left_at
-        return self._moves.in_mission or (math.isfinite(left_at) and (
-            self._positions.path.newest - left_at < MAX_MESSAGE_DELAY))
+    def _flies(self, now: float) -> bool:
+        """Whether it is in mission mode at `now` [s], or was until a moment ago."""
+        left_at, positions = self._moves.left_at, self._positions
+        return self._moves.in_mission or (math.isfinite(left_at) and max(
+            positions.path.newest, positions.vehicle_time(now)) - left_at < MAX_MESSAGE_DELAY)
 
     def note_reached(self, seq: int, now: float) -> None:
         """Take a MISSION_ITEM_REACHED: a restarted vehicle has reached nothing yet.
@@ -84,17 +83,18 @@ class EndBeforeRestart:
             self._tasks.credit(self._ending[1])
             self._ending = None
 
-    def note_current(self, message: Message, now: float) -> None:
+    def note_current(self, message: Message, now: float, by_mission: bool) -> None:
         """Take a MISSION_CURRENT: a restarted vehicle has not flown its mission to the end yet.
 
         Args:
             message: as PX4 sends it.
             now: steady time [s].
+            by_mission: whether no take-off or landing can have ended, which PX4 reports the same.
         """
         if message.mission_state != dialect.MISSION_STATE_COMPLETE:
             self._note_next(message, now)
             return
-        if self._flies and message.seq == self._epoch.last_flown:
+        if by_mission and self._flies(now) and message.seq == self._epoch.last_flown:
             self._ended = self._epoch.number, message.seq, now
             self._credit_last(message.seq, now)
         if self._ending is None:

@@ -123,14 +123,10 @@ class PassedItems:
 
     def _unobserved(self, rest: tuple[Item, ...], visits: dict[str, Visit],
                     claim: Claim, left_unseen: bool) -> tuple[Item, ...]:
-        """At the deadline: the items that can have been flown in a gap of the positions.
-
-        It may have been seen again before it came to the last of them.
-        """
+        """At the deadline: the items that can have been flown in a gap of the positions."""
         items = tuple(
             i for i in rest if visits[i.task] is Visit.UNOBSERVED and i.position is not None)
-        return next((items[:end] for end in range(len(items), 0, -1)
-                     if self.flown_unseen(items[:end], claim, left_unseen)), ())
+        return items if items and self.flown_unseen(items, claim, left_unseen) else ()
 
     def flown_unseen(self, items: tuple[Item, ...], claim: Claim, left_unseen: bool) -> bool:
         """Whether it reappeared on a leg after them, and had the time to fly there.
