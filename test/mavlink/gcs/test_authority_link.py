@@ -252,3 +252,16 @@ def test_a_reboot_on_the_ground_while_it_is_suspended_changes_nothing(kind):
     bench.vehicles[1].reboot(bench.now)  # which ends the failsafe
     bench.run(limit=10.0)
     assert status_is(bench, H)
+
+
+@BOTH
+def test_a_change_that_nothing_explains_is_a_loss_where_the_link_is_lost_meanwhile(kind):
+    bench = AuthorityBench(kind).discover()
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.run(lambda: bench.authority() is S, 10.0)
+    bench.line.cut = True
+    bench.run(limit=3.6)
+    bench.line.cut = False
+    bench.run(limit=8.0)
+    assert status_is(bench, L)
+    assert bench.hand_over() == ''

@@ -60,7 +60,9 @@ class LinkLoss:
             return
         if (state.mode in self._modes and state.armed in self._armed) or (
                 state.booting and not (state.flown or state.armed)):
-            state.unconfirmed, state.unexplained = False, None
+            state.unconfirmed = False
+            if not state.authority.suspended_by(Suspension.UNEXPLAINED):
+                state.unexplained = None  # else it is still to be explained, or lost
             state.apply(AuthorityEvent.LINK_BACK, now,
                         f'the link is back, in {state.name_of(state.mode)}')
             return
