@@ -180,9 +180,10 @@ class Judge:
             before, self._mode_at = self._shown, event.t
             if event.cause not in (OURS, 'self'):
                 self._mode_set(before, event)
-                if event.mode == self._shown and self.taken_at == self._taken_by_mode == event.t:
-                    self._mode_undone()
-            elif event.cause == OURS and (self.known_at is None or (
+            if event.cause != OURS and event.mode == self._shown and (
+                    self.taken_at == self._taken_by_mode == event.t):
+                self._mode_undone()  # also by a PX4 that was disarmed by it on the ground
+            if event.cause == OURS and (self.known_at is None or (
                     self._avoids and self._class(event.mode) is ModeClass.MISSION)):
                 # a command sent before has arrived after it; an avoidance ends by that, too
                 self.taken_at = self.known_at = None

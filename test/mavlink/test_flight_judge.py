@@ -73,7 +73,11 @@ def judged(rows, hand_over_at=-1.0, late=0.0, kind='px4'):
 BY_LAND = [('mode', 'pilot', px4_mode(4, 6)), ('disarmed', 'pilot', None), ('mode', 'pilot', 0)]
 
 
-@pytest.mark.parametrize('disarmed', [[('disarmed', 'pilot', None)], BY_LAND])
+# a PX4 enters its mode of before, once it is disarmed
+BY_LAND_OF_PX4 = [*BY_LAND[:2], ('mode', 'self', 0)]
+
+
+@pytest.mark.parametrize('disarmed', [[('disarmed', 'pilot', None)], BY_LAND, BY_LAND_OF_PX4])
 @pytest.mark.parametrize(('shown', 'overridden'), [
     (None, False), (heartbeat(True), True),
     (d.MAVLink_command_ack_message(d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_RESULT_ACCEPTED), True)])

@@ -115,6 +115,22 @@ def test_fault_22_the_same_list_from_another_item_on_needs_set_current_only(kind
 
 
 @BOTH
+def test_fault_23_late_answers_of_before_an_upload_do_not_make_it_infeasible(kind):
+    bench, late = FlightBench(kind).discover(), []
+
+    def answer_late(direction, message, now):
+        if direction == 'down' and message.get_type() == 'MISSION_COUNT' and len(late) < 3 and (
+                bench.line.sent('MISSION_ITEM_INT')):
+            late.append(now)
+            message.count = 1 if kind == 'ardupilot' else 0
+        return None
+    bench.line.tampers.append(answer_late)
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+    assert (len(late), bench.failed()) == (3, [])
+
+
+@BOTH
 def test_fault_23_accepted_and_then_no_mission_is_infeasible(kind):
     bench = FlightBench(kind).discover()
 

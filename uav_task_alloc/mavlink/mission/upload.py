@@ -34,6 +34,7 @@ ERROR_BACKOFF = (5.0, 8.0)  # [s] drawn between
 DENIED_BACKOFF = (8.0, 12.0)  # [s] drawn between; another ground station is uploading
 SUPERSEDED = 'superseded by tasks completed meanwhile or by a newer list'
 _TRIES = 3  # uploads of one mission until it is given up
+_LATE = 4  # empty readbacks that may be answers to requests sent before the upload
 
 
 class UploadState(Enum):
@@ -141,7 +142,7 @@ class Upload:
         self._due = 0.0
         self._requested: int | None = None
         self._sent_last = self._accepted = False
-        self._read_twice = False  # accepted, but the readback was empty
+        self._empty = 0  # readbacks that were empty, though it was accepted
         self._sent_once = False  # the last item of this mission, in this try or an earlier one
         self._read_at = -math.inf  # [s] end of a readback; it may not know that (ACK lost)
 
@@ -318,7 +319,7 @@ class Upload:
             return
         if self._counts == 0:
             self.uploads += 1
-            self._sent_last = self._accepted = self._read_twice = False
+            self._sent_last, self._accepted, self._empty = False, False, 0
             self._requested = None
         self._counts += 1
         if 0.0 < now - self._read_at < self._idle_after():
@@ -340,8 +341,8 @@ class Upload:
         elif done and self._alike(held, self._mission):
             self.events.append(Verified(self._mission))
             self._go(UploadEvent.MATCH, now)
-        elif done and self._accepted and len(held) <= self._mission.own and not self._read_twice:
-            self._read_twice = True  # a late answer to a request sent before the upload
+        elif done and self._accepted and len(held) <= self._mission.own and self._empty < _LATE:
+            self._empty += 1  # perhaps a late answer to a request sent before the upload
             self._enter(UploadState.READING, now)
         elif done and self._accepted and len(held) <= self._mission.own:
             self._fail('accepted, but no mission is on board: infeasible')
