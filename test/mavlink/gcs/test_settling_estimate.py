@@ -35,6 +35,18 @@ def test_the_next_list_does_not_wait_for_a_take_off_that_its_mission_has_made(wa
     assert bench.noted('take off') == []
 
 
+@pytest.mark.parametrize('wait', [0.0, 0.5, 1.2])
+def test_a_px4_that_its_mission_takes_off_gets_no_take_off_where_its_landed_state_is_late(wait):
+    bench = FindingsBench('px4', configs={1: SETTLES}).discover()
+    assert bench.run(lambda: bench.vehicles[1].flight.positioned, 30.0)
+    bench.run(limit=wait)
+    bench.line.tampers.append(lambda direction, m, now: [(1.5, m)] if (
+        m.get_type() == 'EXTENDED_SYS_STATE') else None)
+    bench.assign(task_list('ABC', side=300.0))
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'], 200.0)
+    assert [e.command for e in bench.truth[1] if e.name == 'command'] == ['arm', 'mode']
+
+
 def test_after_its_landing_it_is_not_armed_by_the_bridge():
     bench = started_while_settling(0.5)
     bench.run(limit=2.0)

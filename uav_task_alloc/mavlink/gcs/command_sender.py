@@ -278,6 +278,8 @@ class CommandSender:
                 self._arming_since, self.arming_refusal = now, ''
             return self.start(Command(_ARM, arm, lambda: telemetry.armed, attempts=_ARM_ATTEMPTS,
                                       retry_refused=True, wanted=wanted), now, self._armed)
+        if self._profile.amsl_takeoff and telemetry.mode is ModeFunction.MISSION:
+            return self.wait_for('its mission to take it off')  # set as it looked airborne
         if not self.armed_here:
             return self.wait_for('it to disarm: it was armed by another party, or has just landed')
         ground = telemetry.altitude - (
