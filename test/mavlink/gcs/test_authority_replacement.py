@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A pilot or a failsafe while a mission is replaced in flight, and a replacement that stalls."""
+import math
+
 import pytest
 from authority_bench import (
     ARDUPILOT,
     BOTH,
     COPTER,
     MODES,
+    AuthorityBench,
     H,
     L,
     N,
@@ -16,12 +19,14 @@ from authority_bench import (
     sends_no_command,
     status_is,
 )
+from flight_bench import places
 from mission_bench import task_list
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
 from uav_task_alloc.model import Shape, ThreatZone
 
 NEW = 'ZYXWVUTSRQ'
+BRAKE = 17
 MOMENTS = pytest.mark.parametrize('moment', ['holding', 'counting', 'sending', 'sent', 'reading'])
 
 
@@ -186,3 +191,24 @@ def test_a_pilot_who_takes_over_during_a_stalled_replacement_keeps_control(kind,
     assert bench.run(lambda: bench.authority() is L, 3.0)
     bench.line.tampers.clear()
     transfer_ended(bench, len(bench.sent))
+
+
+@pytest.mark.parametrize('after', [0.0, 0.3, 0.6])
+def test_killed_in_an_upload_after_a_hand_over_the_current_item_completes_nothing(after):
+    """ArduPilot keeps the number of its current item, which is of the mission before."""
+    bench = AuthorityBench('ardupilot', delay=(0.1, 0.1), tick=0.1).discover()
+    bench.assign(task_list('ABCD', service=6.0))
+    body = bench.vehicles[1].flight.body
+    place = task_list('C').stops[0].task.position
+    assert bench.run(lambda: math.dist(body.position, place) < 1.0, 200.0)
+    bench.vehicles[1].rc_mode(BRAKE)
+    assert bench.run(lambda: bench.authority() is L, 20.0)
+    assert 'C' not in places(bench)
+    bench.assign(task_list('CZD', 2, service=6.0))
+    assert bench.hand_over() == ''
+    assert bench.run(lambda: len(bench.onboard().progress.items) == 3, 30.0)
+    bench.run(limit=after)
+    bench.kill_and_restart(0.1)
+    bench.assign(task_list('CZD', 2, service=6.0))
+    bench.run(limit=4.0)
+    assert not set(bench.completed()) - set(places(bench))

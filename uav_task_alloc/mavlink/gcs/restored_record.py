@@ -36,8 +36,8 @@ def restore_record(record: AuthorityRecord | None, onboard: OnboardMission,
         resume.was_disarmed, resume.was_in_mission = not record.armed, (
             profile.mode_function(record.mode or 0) is ModeFunction.MISSION)
         # the current item may be of the replaced mission, or set by another party
-        resume.was_replacing = record.replacing_since is not None and not profile.atomic and (
-            bool(record.uploading))
+        resume.was_replacing = not profile.atomic and bool(record.uploading) and (
+            record.replacing_since is not None or not resume.was_in_mission)
         resume.current_unreliable = resume.was_replacing or (
             record.state is AuthorityState.LOST and not resume.was_in_mission)
     for mark in watch.marks.values():
