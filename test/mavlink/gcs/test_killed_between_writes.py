@@ -86,16 +86,23 @@ class KilledBench(FlightBench):
         return places(self)
 
 
+def killed_at_each_write(make):
+    """The benches that `make(write)` gives for each write, until the bridge is not killed."""
+    write, killed = 0, True
+    while killed:
+        write += 1
+        bench = make(write)
+        yield write, bench
+        killed = bench.killed
+
+
 @pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 @pytest.mark.parametrize('before', [True, False])
 @pytest.mark.parametrize(('down', 'service'), [(0.0, 0.0), (15.0, 3.0)])
 def test_killed_at_any_write_each_task_is_flown_once_and_reported(kind, before, down, service):
-    write, killed = 0, True
-    while killed:
-        write += 1
-        bench = KilledBench(kind, write, before, down, service)
+    for write, bench in killed_at_each_write(
+            lambda write: KilledBench(kind, write, before, down, service)):
         assert bench.fly() == list(NAMES), f'write {write}'
-        killed = bench.killed
     assert write > len(NAMES)
 
 
@@ -132,13 +139,10 @@ class TurnedBench(KilledBench):
 @pytest.mark.parametrize('before', [True, False])
 @pytest.mark.parametrize(('near', 'down'), [(3.0, 0.0), (10.0, 15.0)])
 def test_killed_at_any_write_of_a_replacement_no_task_is_flown_twice(kind, before, near, down):
-    write, killed = 0, True
-    while killed:
-        write += 1
-        bench = TurnedBench(kind, write, before, down, near)
+    for write, bench in killed_at_each_write(
+            lambda write: TurnedBench(kind, write, before, down, near)):
         bench.fly()
         assert sorted(bench.reached()) == list(ROW), f'write {write}'
-        killed = bench.killed
     assert write > len(ROW)
 
 

@@ -171,7 +171,8 @@ class MissionEvidence:
     def _unset_start(self) -> int | None:
         """The item to be set on an ArduPilot whose current item may be of the mission before."""
         onboard = self._onboard
-        if self._atomic or onboard.set_current_to is not None:
-            return None if self._atomic else onboard.set_current_to
-        intact = onboard.stored is MissionState.VERIFIED
-        return None if intact else onboard.progress.current or 0
+        if self._atomic:
+            return None
+        if onboard.set_current_to is not None or onboard.stored is MissionState.VERIFIED:
+            return onboard.set_current_to
+        return onboard.progress.current or 0

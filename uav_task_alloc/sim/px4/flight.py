@@ -80,6 +80,7 @@ class Px4Flight(VehicleFlight):
         return done
 
     def prearm_refusal(self) -> str:
+        """Reason not to arm in its mode: that is among the checks of a PX4; '' where none."""
         if self.mode in _KEEPS_DISARMED:
             return 'Mode not suitable for arming'
         return super().prearm_refusal()
