@@ -37,9 +37,10 @@ browser: .ros/.made
 linted: install/.built
 	@echo '== ruff, mypy' && .ros/bin/ruff check . && .ros/bin/mypy
 
-# Collecting compiles the tests once for all workers; pytest shows its errors later
-collected: build
-	@$(RUN) && REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null || :
+# Collecting compiles the tests once for all workers, without waiting for the kernels; pytest shows
+# its errors later
+collected: install/.built
+	@$(RUN) && NUMBA_DISABLE_JIT=1 REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null 2>&1 || :
 
 # Line coverage of the package without nodes; below the floor of setup.cfg it fails
 coverage: build
