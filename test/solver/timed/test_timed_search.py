@@ -15,7 +15,7 @@ from uav_task_alloc.solver.solve import plan
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK
 from uav_task_alloc.solver.timed.colony import COLD, TimedColony
-from uav_task_alloc.solver.timed.insertion import near_place
+from uav_task_alloc.solver.timed.insertion import near_place, unlink
 from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
@@ -26,9 +26,10 @@ from uav_task_alloc.solver.timed.ruin import (
     insert_removed,
     list_absent,
     ruin_strings,
+    save_route,
     take_back,
 )
-from uav_task_alloc.solver.timed.segments import cost_of
+from uav_task_alloc.solver.timed.segments import cost_of, update
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState
 from uav_task_alloc.study.small_problems import compare_small, small_problem
@@ -255,6 +256,39 @@ def test_a_round_that_is_given_up_would_not_have_cost_less_than_the_limit(object
         given_up += ends[0] != ends[1]
         assert ends[0] == ends[1] or ends[1][1] >= before - 1e-6
     assert given_up > 50
+
+
+@pytest.mark.parametrize('response', [0.0, 1.0])
+def test_a_place_costs_what_it_adds_to_all_ends_that_are_nearly_the_last_one(response):
+    r = random.Random(15)
+    fleet = [Uav(f'u{i}', (r.uniform(0.0, 2000.0), 0.0, 0.0)) for i in range(4)]
+    work = [Task(f't{i}', (r.uniform(0.0, 2000.0), r.uniform(0.0, 2000.0), 0.0),
+                 service_time=5.0) for i in range(30)]
+    rules = Rules(returns=True, objective=Objective(1e-3, 1.0, response))
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony.fly(0.0, 0.5, 300)
+    a, routes, w, counted = colony.arrays, colony.routes, empty_round(colony.arrays), 0
+    ends = routes.route[:, at.END]
+    a.weight[at.FINISH_FROM] = 0.8 * np.sort(ends)[1]
+    set_order(a, routes, colony.best.order)
+    for t in range(a.uavs, a.ends):
+        u, full = routes.link[t, at.OF_UAV], cost_of(a, routes.sums) + a.unserved[t - a.uavs]
+        before = routes.link[t, at.PREV]
+        then, tasks = routes.link[t, at.NEXT], routes.route[u, at.TASKS]
+        begin_round(routes, w)
+        save_route(a, routes, w, u)
+        unlink(a, routes, LINK(t))
+        update(a, routes, u, before, then, tasks)
+        less = cost_of(a, routes.sums)
+        assert cost_at(a, routes, u, LINK(t), before) == pytest.approx(full - less, abs=1e-6)
+        take_back(a, routes, w)
+        last = routes.sums[at.FINISH]
+        assert routes.sums[at.BEYOND] == pytest.approx(
+            sum(max(0.0, end - a.weight[at.FINISH_FROM]) for end in ends))
+        counted += last > a.weight[at.FINISH_FROM] and ends[u] < last - 1.0 and (
+            ends[u] > a.weight[at.FINISH_FROM])
+    assert counted >= 5  # on routes that count though they are not the last
 
 
 def selection_problem():

@@ -83,7 +83,7 @@ class TimedRoutes(NamedTuple):
     row: Floats  # (nodes, columns from START)
     trip: Floats  # (slots, 4) columns from CARRIED
     route: Floats  # (m, columns from WARP)
-    sums: Floats  # (9) columns from WARP, without END and TASKS
+    sums: Floats  # (10) columns from WARP, without END and TASKS
     counts: Ints  # (2)
     empty: Ints  # (classes) number of empty routes
     way: Links  # (nodes, 2) rows where each is entered and left

@@ -46,6 +46,7 @@ class TimedParams:
     absent: int = 10  # absent tasks that a round tries to insert, besides those it removes
     skipped: float = 0.0  # probability that a round passes over one of them
     by_value: float = 0.0  # share of rounds that insert about the most valuable tasks first
+    nearly_last: float = 3.0  # temperatures before the last end of a route from which all count
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
     intensifies: bool = False  # where there are many tasks, also as an Intensifier does
 
@@ -77,7 +78,8 @@ class TimedColony:
     def __init__(self, problem: TimedProblem, start: Incumbent, seed: int,
                  params: TimedParams, begin: Incumbent | None = None) -> None:
         arrays = problem.arrays
-        self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy())
+        self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy(),
+                                      weight=arrays.weight.copy())
         self.best = copy_incumbent(start)
         self._params, self._scale = params, problem.scale
         self._goal, self._decided = problem.base.rules.objective, False
@@ -130,6 +132,17 @@ class TimedColony:
             share = min(1.0, spent / p.restart)
         return float(self._scale * first * (self._end_temperature / first) ** share)
 
+    def _lead_to_early_ends(self, temperature: float) -> None:
+        """Let the search count all ends that are nearly the last one, as columns.py defines.
+
+        A route that ends last is often one of several: to shorten one of them alone gains nothing.
+        """
+        weight, ends = self.arrays.weight, self.routes.route[:, at.END]
+        if weight[at.BY_FINISH] > 0.0:
+            early = self._params.nearly_last * temperature / weight[at.BY_FINISH]
+            weight[at.FINISH_FROM] = ends.max() - early
+            self.routes.sums[at.BEYOND] = np.maximum(0.0, ends - weight[at.FINISH_FROM]).sum()
+
     def fly(self, spent: float, until: float, rounds: int) -> int:
         """Run rounds of search.
 
@@ -161,6 +174,7 @@ class TimedColony:
             set_order(self.arrays, self.routes, (self._begin or self.best).order)
         if self._intensifier:
             self._intensify(self._intensifier, spent)
+        self._lead_to_early_ends(self._temperature(spent))
         self._gains += anneal(self.arrays, self.routes, self._round, self.best, self._rises,
                               self._params.ruin, self._temperature(spent),
                               self._temperature(until), rounds, self._rng)

@@ -11,9 +11,9 @@ FIXED_COLUMNS = 16
 READY, IN_AIR, LAST_DEPARTURE, EMPTY_LENGTH, EMPTY_TIME, GROUNDED, CRUISE, HELD = range(8)
 BEGIN_COLUMNS = 8
 # columns of TimedArrays.weight
-# BY_END: of the end of each route, which leads the search to an early last one; BY_EXCESS: of a
-# metre beyond range or endurance, inf: not allowed
-BY_DISTANCE, BY_FINISH, BY_LATENESS, BY_END, BY_EXCESS = range(5)
+# FINISH_FROM: [s] from which on the search counts the end of each route, not only the last one;
+# BY_EXCESS: of a metre beyond range or endurance, inf: not allowed
+BY_DISTANCE, BY_FINISH, BY_LATENESS, FINISH_FROM, BY_EXCESS = range(5)
 # columns of TimedRoutes.link, by node
 NEXT, PREV, OF_UAV, HEAD = range(4)  # OF_UAV: m where a task is in no route
 # columns of TimedRoutes.way, by node: row of TimedArrays.fixed and point where it begins and ends
@@ -31,7 +31,8 @@ TRIP_COLUMNS = 4
 # columns of TimedRoutes.route, by UAV; WARP to ENDURANCE_EXCESS are also those of sums
 WARP, LOAD_EXCESS, RANGE_EXCESS, ENDURANCE_EXCESS, METRES, TIME_COST, END, TASKS = range(8)
 ROUTE_COLUMNS = 8
-FINISH, UNSERVED_COST, SERVED_WORTH = range(6, 9)  # further columns of TimedRoutes.sums
-SUM_COLUMNS = 9
+# further columns of TimedRoutes.sums; BEYOND: [s] of the ends of all routes after FINISH_FROM
+FINISH, UNSERVED_COST, SERVED_WORTH, BEYOND = range(6, 10)
+SUM_COLUMNS = 10
 # entries of TimedRoutes.counts
 INFEASIBLE, SERVED = range(2)  # routes with excess, tasks served

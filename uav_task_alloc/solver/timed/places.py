@@ -7,7 +7,7 @@ import math
 from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.segments import after_leg, leg_of, slot_of
+from uav_task_alloc.solver.timed.segments import after_leg, finish_cost, leg_of, slot_of
 from uav_task_alloc.solver.timed.ways import TURNED, directions, face, has_paths, service_of
 
 
@@ -44,9 +44,10 @@ def cost_of_delay(a: TimedArrays, r: TimedRoutes, u: int, t: int, start: float, 
         cost += a.weight[at.BY_LATENESS] * late
     if a.weight[at.BY_FINISH] > 0.0:
         end = r.row[a.ends + u, at.START] + max(0.0, delay - r.row[then, at.WAITS])
-        cost += a.weight[at.BY_FINISH] * max(0.0, end - r.sums[at.FINISH])
-    if r.route[u, at.TASKS] == 0.0:
-        cost += a.weight[at.BY_END] * r.row[then, at.START]
+        more = max(0.0, end - a.weight[at.FINISH_FROM]) - max(
+            0.0, r.route[u, at.END] - a.weight[at.FINISH_FROM])
+        last = r.sums[at.FINISH]
+        cost += finish_cost(a, max(last, end), more) - finish_cost(a, last, 0.0)
     return float(cost)
 
 

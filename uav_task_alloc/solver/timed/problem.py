@@ -178,7 +178,7 @@ def _weights(problem: Problem) -> Floats:
     goal = rules.objective
     late = goal.lateness if math.isfinite(goal.lateness) else 0.0
     excess = math.inf if rules.hard else excess_cost(rules.weights) * goal.distance
-    return np.array([goal.distance, goal.finish, late, 0.0, excess])
+    return np.array([goal.distance, goal.finish, late, math.inf, excess])
 
 
 def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) -> Floats:

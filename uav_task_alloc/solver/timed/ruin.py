@@ -47,7 +47,7 @@ class Round(NamedTuple):
     uav: Ints  # (m) saved routes: their UAVs
     route: Floats  # (m, columns from WARP)
     trip: Floats  # (slots, 4)
-    sums: Floats  # (9)
+    sums: Floats  # (10)
     routes_count: Ints  # (2) TimedRoutes.counts before the round
     removed: Links  # task nodes to be inserted
     order: Floats  # sort key of each: smallest first

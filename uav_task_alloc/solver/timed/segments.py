@@ -130,9 +130,8 @@ def _cost_of_time(a: TimedArrays, r: TimedRoutes, u: int) -> float:
     if r.route[u, at.TASKS] == 0.0:
         r.row[j, at.RATE] = r.row[j, at.WAITS] = r.row[u, at.WAITS] = 0.0
         r.row[u, at.RATE] = 0.0
-        r.row[j, at.RATE] = a.weight[at.BY_END]
         return 0.0
-    rate, waits, cost = a.weight[at.BY_END], 0.0, a.weight[at.BY_END] * r.row[j, at.START]
+    rate = waits = cost = 0.0
     while True:
         r.row[j, at.RATE], r.row[j, at.WAITS] = rate, waits
         i = r.link[j, at.PREV]
@@ -204,10 +203,11 @@ def _update_route(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None
         r.route[u, at.END] = (
             r.row[end, at.START] if tasks > 0.0 or a.begin[u, at.HELD] > 0.0 else 0.0)
         if a.weight[at.BY_FINISH] > 0.0:
-            last = 0.0
+            last = beyond = 0.0
             for v in range(a.uavs):
                 last = max(last, r.route[v, at.END])
-            r.sums[at.FINISH] = last
+                beyond += max(0.0, r.route[v, at.END] - a.weight[at.FINISH_FROM])
+            r.sums[at.FINISH], r.sums[at.BEYOND] = last, beyond
     if (before > 0.0) != (tasks > 0.0):
         r.empty[a.class_of[u]] += 1 if before > 0.0 else -1
 
@@ -365,10 +365,16 @@ def join(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> None:
 
 
 @inline_kernel
+def finish_cost(a: TimedArrays, last: float, beyond: float) -> float:
+    """What the ends of routes cost the search, by the last one and `beyond` of sums. O(1)."""
+    return float(a.weight[at.BY_FINISH] * (min(last, a.weight[at.FINISH_FROM]) + beyond))
+
+
+@inline_kernel
 def cost_of(a: TimedArrays, sums: Floats) -> float:
     """Cost of the search: the objective, unserved tasks, and excess at its present prices."""
     cost = (a.weight[at.BY_DISTANCE] * sums[at.METRES] + sums[at.TIME_COST]
-            + a.weight[at.BY_FINISH] * sums[at.FINISH] + sums[at.UNSERVED_COST])
+            + finish_cost(a, sums[at.FINISH], sums[at.BEYOND]) + sums[at.UNSERVED_COST])
     for c in range(4):
         if sums[c] > TOLERANCE:
             cost += a.price[c] * sums[c]
