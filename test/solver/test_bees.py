@@ -9,10 +9,19 @@ from plan_checks import check, make
 from uav_task_alloc import plan
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver.bidding import Bidding
-from uav_task_alloc.solver.colony import PHASES, Colony, ColonyParams
+from uav_task_alloc.solver.colony import PHASES, RECOMBINED_COST, Colony, ColonyParams
+from uav_task_alloc.solver.pool import collect
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.rng import rng_state
-from uav_task_alloc.solver.routes import DISTANCE, clear, empty_routes
+from uav_task_alloc.solver.routes import (
+    DISTANCE,
+    NODE,
+    UNASSIGNED_COST,
+    clear,
+    copy,
+    empty_routes,
+    remove,
+)
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.tables import INITIAL_Q, fresh_tables, to_learnt
 from uav_task_alloc.solver.warm import repair
@@ -67,6 +76,23 @@ def test_intensification_continues_from_the_best():
     colony._intensify(1e6)
     assert (colony.routes.next == start.next).all()
     assert colony.routes.sums == pytest.approx(start.sums)
+
+
+@pytest.mark.parametrize('share', [0.5, 0.2])  # of what the way to a task costs, of its first cost
+def test_a_combination_that_serves_more_tasks_is_found_at_a_low_cost_of_those_left_out(share):
+    problem = problem_of(*make(2, 9))
+    a, full = problem.arrays, repair(problem, {})
+    less = copy(full)
+    remove(a, less, NODE(a.uavs + 3))
+    way = float(full.sums[DISTANCE] - less.sums[DISTANCE])
+    a.unassigned_cost[:] = share * way
+    colony = Colony(problem, less, 1, ColonyParams())
+    collect(a, full, colony._pool)
+    colony._intensify(1e6)
+    served = share * RECOMBINED_COST > 1.0
+    for routes in (colony.best, colony.routes):
+        assert routes.tasks.sum() == 8 + served
+        assert routes.sums[UNASSIGNED_COST] == pytest.approx((1 - served) * share * way)
 
 
 def test_scouts_that_learn_beat_scouts_that_do_not():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from uav_task_alloc.solver.bidding import Bidding
 from uav_task_alloc.solver.pool import empty_pool
 from uav_task_alloc.solver.problem import Problem
@@ -27,6 +29,9 @@ from uav_task_alloc.solver.selection import out_of_reach
 
 PHASES = (0.0, 0.45, 0.92, 1.0)  # shares of the budget: cooling, second cooling, constant
 WORK = 150.0  # stops of the pool read by `recombine` per round of the whole search
+# first cost of an unassigned task, times which one costs there at least: at the low cost of a
+# search to and fro between both, combinations that serve fewer tasks are the cheapest
+RECOMBINED_COST = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +92,7 @@ class Colony:
         if params.selects:
             self.arrays.unassigned_cost[out_of_reach(problem)] = 0.0
             update_sums(self.arrays, self.best)
+        self._recombined_cost = RECOMBINED_COST * self.arrays.unassigned_cost
 
     def temperature(self, spent: float) -> float:
         """Temperature [m] after this share of the budget."""
@@ -129,11 +135,12 @@ class Colony:
     def _intensify(self, work: float) -> None:
         """Continue from the best, after a search for a cheaper combination in the pool."""
         a = self.arrays
-        if recombine(a, self.best, self._pool, work, self._scratch) and (
+        dear = a._replace(unassigned_cost=np.maximum(a.unassigned_cost, self._recombined_cost))
+        if recombine(dear, self.best, self._pool, work, self._scratch) and (
                 is_better(a, self._scratch, self.best)):
             copy_into(self._scratch, self.best)
+        update_sums(a, self.best)  # penalties and costs have changed since
         copy_into(self.best, self.routes)
-        update_sums(a, self.routes)  # penalties and costs have changed since
 
     def _trim_current(self) -> None:
         """Where the best leaves tasks out, try the current routes, trimmed to the ranges."""
