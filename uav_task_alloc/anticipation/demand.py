@@ -35,7 +35,7 @@ class DemandModel:
     spot_size: float = 1000.0  # [m] standard deviation of a spot at its begin
     spot_forgetting: tuple[float, ...] = (1200.0, math.inf)  # [s] of each mixture of spots
     prior: float = 1.0  # tasks that the uniform prior is worth
-    even: float = 0.65  # share of the estimate that tasks are uniform, at the begin
+    even: float = 0.5  # share of the estimate that tasks are uniform, at the begin
     spot_share: float = 0.3  # of mixtures of spots together, at the begin
     share: float = 0.002  # of its weight that an estimate hands out to all at each task
 
