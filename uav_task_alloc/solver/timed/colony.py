@@ -26,6 +26,7 @@ GIVING_UP = 0.6  # share after which a search through excess ends that found not
 # rounds a task from which on passing through excess pays: where durations or trips are limited,
 # and where only windows and loads are
 PRICED_ROUNDS, PRICED_WINDOW_ROUNDS = 200.0, 1500.0
+MOST_EARLY = 0.5  # share of the last end of a route: no end before that counts
 FRESH_ROUNDS = 15.0  # rounds a task from which on a second search from new routes pays
 # probability that a place is passed over where there are at most FEW_TASKS, not BLINK_RATE: the
 # cheapest places of all of them are soon the same in each round
@@ -140,7 +141,7 @@ class TimedColony:
         weight, ends = self.arrays.weight, self.routes.route[:, at.END]
         if weight[at.BY_FINISH] > 0.0:
             early = self._params.nearly_last * temperature / weight[at.BY_FINISH]
-            weight[at.FINISH_FROM] = ends.max() - early
+            weight[at.FINISH_FROM] = ends.max() - min(early, MOST_EARLY * ends.max())
             self.routes.sums[at.BEYOND] = np.maximum(0.0, ends - weight[at.FINISH_FROM]).sum()
 
     def fly(self, spent: float, until: float, rounds: int) -> int:
