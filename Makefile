@@ -37,8 +37,8 @@ browser: .ros/.made
 linted: install/.built
 	@echo '== ruff, mypy' && .ros/bin/ruff check . && .ros/bin/mypy
 
-# Collecting compiles the tests once for all workers, without waiting for the kernels; pytest shows
-# its errors later
+# Collecting compiles the tests once for all workers, without waiting for the kernels: without numba
+# most imports fail, after the compilation. Pytest collects all again, and shows what fails then.
 collected: install/.built
 	@$(RUN) && NUMBA_DISABLE_JIT=1 REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null 2>&1 || :
 

@@ -29,8 +29,8 @@ from uav_task_alloc.solver.selection import out_of_reach
 
 PHASES = (0.0, 0.45, 0.92, 1.0)  # shares of the budget: cooling, second cooling, constant
 WORK = 150.0  # stops of the pool read by `recombine` per round of the whole search
-# first cost of an unassigned task, times which one costs there at least: at the low cost of a
-# search to and fro between both, combinations that serve fewer tasks are the cheapest
+# times the first cost of an unassigned task: what one costs there at least. At that first cost, as
+# in a search that passes to and fro, combinations that serve fewer tasks are often the cheapest
 RECOMBINED_COST = 3.0
 
 

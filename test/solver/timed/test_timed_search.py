@@ -291,6 +291,37 @@ def test_a_place_costs_what_it_adds_to_all_ends_that_are_nearly_the_last_one(res
     assert counted >= 5  # on routes that count though they are not the last
 
 
+@pytest.mark.parametrize('unserved', [math.inf, 6.0])
+def test_all_ends_count_unless_tasks_may_be_left_out_at_a_price(unserved):
+    fleet, work = mixed_problem(16)
+    rules = Rules(objective=Objective(1e-3, 1.0, unserved=unserved))
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony.fly(0.0, 0.5, 10)
+    assert (colony.arrays.weight[at.FINISH_FROM] < math.inf) == (unserved == math.inf)
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_old_tasks_that_cost_less_than_nothing_to_leave_out_end_no_search(seed):
+    r = random.Random(seed)
+    fleet = [Uav(f'u{i}', (r.uniform(0.0, 1000.0), r.uniform(0.0, 1000.0), 0.0))
+             for i in range(2)]
+    work = [Task(f't{i}', (r.uniform(0.0, 1000.0), r.uniform(0.0, 1000.0), 0.0),
+                 value=r.choice([1.0, 2.0]), announced=r.choice([0.0, -100.0, -400.0]))
+            for i in range(6)]
+    goal = Objective(0.05, 0.0, 1.0, unserved=40.0)
+    built, found = (plan(fleet, work, budget=60.0, max_iterations=rounds, objective=goal)
+                    for rounds in (0, 600))
+    assert found.cost <= built.cost + 1e-9
+
+
+def test_a_uav_whose_locked_tasks_end_after_its_time_ends_no_search():
+    fleet = [Uav('u', (0.0, 0.0, 0.0), available_until=10.0), Uav('v', (0.0, 9.0, 0.0))]
+    work = [Task('a', (1000.0, 0.0, 0.0)), Task('b', (500.0, 0.0, 0.0))]
+    found = plan(fleet, work, locked={'u': ('a',)}, budget=60.0, max_iterations=100)
+    assert found.routes['u'][0] == 'a'
+
+
 def selection_problem():
     """A UAV that reaches few of the tasks in time."""
     work = [Task(f't{i}', (10.0 + i, 0.0, 0.0), latest=3.0, value=1.0 + i) for i in range(30)]

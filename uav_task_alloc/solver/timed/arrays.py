@@ -64,7 +64,7 @@ class TimedArrays(NamedTuple):
     restricted: NDArray[np.bool_]  # (n) some UAV may not serve it
     price: Floats  # (4) of excess of WARP, LOAD, RANGE, ENDURANCE; inf: not allowed
     unserved: Floats  # (n) cost of not serving a task
-    weight: Floats  # (5) coefficients of the objective; that of response is in WEIGHT
+    weight: Floats  # (5) of the objective, columns from BY_DISTANCE; that of response is in WEIGHT
     near: Links  # (n, k) task nodes, nearest first
     near_length: Floats  # (n, k) [m]
     near_count: Ints  # (n) of neighbours

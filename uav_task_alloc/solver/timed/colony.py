@@ -137,9 +137,10 @@ class TimedColony:
         """Let the search count all ends that are nearly the last one, as columns.py defines.
 
         A route that ends last is often one of several: to shorten one of them alone gains nothing.
+        Not where tasks may be left out at a price: with all these ends none seems to be worth it.
         """
         weight, ends = self.arrays.weight, self.routes.route[:, at.END]
-        if weight[at.BY_FINISH] > 0.0:
+        if weight[at.BY_FINISH] > 0.0 and not self._rises.prizes:
             early = self._params.nearly_last * temperature / weight[at.BY_FINISH]
             weight[at.FINISH_FROM] = ends.max() - min(early, MOST_EARLY * ends.max())
             self.routes.sums[at.BEYOND] = np.maximum(0.0, ends - weight[at.FINISH_FROM]).sum()

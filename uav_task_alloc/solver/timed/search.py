@@ -52,7 +52,9 @@ class Incumbent(NamedTuple):
 
 def empty_incumbent(a: TimedArrays) -> Incumbent:
     """An incumbent without routes, which any is better than."""
-    return Incumbent(np.arange(node_count(a)).astype(LINK), np.array([math.inf, -math.inf]))
+    order = np.arange(node_count(a))
+    order[:a.uavs] += a.ends
+    return Incumbent(order.astype(LINK), np.array([math.inf, -math.inf]))
 
 
 def copy_incumbent(best: Incumbent) -> Incumbent:
@@ -157,7 +159,8 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
                             rises.skipped, rng)
         if rises.prizes and uniform(rng) < GENEROUS_RATE:
             generous += uniform(rng)
-        if opening and w.counts[REMOVED] > 0 and r.link[seed, at.OF_UAV] == a.uavs:
+        if (opening and a.unserved[seed - a.uavs] > 0.0  # else it is not among those removed
+                and w.counts[REMOVED] > 0 and r.link[seed, at.OF_UAV] == a.uavs):
             open_route(a, r, w, seed)
         limit = _limit(before, temperature, rng) if gives_up else math.inf
         insert_removed(a, r, w, generous, rises.by_value, rises.blinks, limit, rng)

@@ -372,7 +372,10 @@ def finish_cost(a: TimedArrays, last: float, beyond: float) -> float:
 
 @inline_kernel
 def cost_of(a: TimedArrays, sums: Floats) -> float:
-    """Cost of the search: the objective, unserved tasks, and excess at its present prices."""
+    """Cost of the search: the objective, unserved tasks, and excess at its present prices.
+
+    Ends of routes count as in `finish_cost`.
+    """
     cost = (a.weight[at.BY_DISTANCE] * sums[at.METRES] + sums[at.TIME_COST]
             + finish_cost(a, sums[at.FINISH], sums[at.BEYOND]) + sums[at.UNSERVED_COST])
     for c in range(4):
