@@ -135,8 +135,8 @@ class Colony:
     def _intensify(self, work: float) -> None:
         """Continue from the best, after a search for a cheaper combination in the pool."""
         a = self.arrays
-        dear = a._replace(unassigned_cost=np.maximum(a.unassigned_cost, self._recombined_cost))
-        if recombine(dear, self.best, self._pool, work, self._scratch) and (
+        raised = a._replace(unassigned_cost=np.maximum(a.unassigned_cost, self._recombined_cost))
+        if recombine(raised, self.best, self._pool, work, self._scratch) and (
                 is_better(a, self._scratch, self.best)):
             copy_into(self._scratch, self.best)
         update_sums(a, self.best)  # penalties and costs have changed since

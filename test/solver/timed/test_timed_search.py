@@ -291,14 +291,16 @@ def test_a_place_costs_what_it_adds_to_all_ends_that_are_nearly_the_last_one(res
     assert counted >= 5  # on routes that count though they are not the last
 
 
-@pytest.mark.parametrize('unserved', [math.inf, 6.0])
-def test_all_ends_count_unless_tasks_may_be_left_out_at_a_price(unserved):
+@pytest.mark.parametrize(('prices', 'hard', 'count'), [
+    ({}, True, True), ({'unserved': 6.0}, True, False), ({'lateness': 0.2}, True, False),
+    ({}, False, False)])
+def test_all_ends_count_unless_something_else_has_a_price(prices, hard, count):
     fleet, work = mixed_problem(16)
-    rules = Rules(objective=Objective(1e-3, 1.0, unserved=unserved))
+    rules = Rules(hard=hard, objective=Objective(1e-3, 1.0, **prices))
     problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
     colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
     colony.fly(0.0, 0.5, 10)
-    assert (colony.arrays.weight[at.FINISH_FROM] < math.inf) == (unserved == math.inf)
+    assert (colony.arrays.weight[at.FINISH_FROM] < math.inf) == count
 
 
 @pytest.mark.parametrize('seed', range(6))

@@ -137,10 +137,13 @@ class TimedColony:
         """Let the search count all ends that are nearly the last one, as columns.py defines.
 
         A route that ends last is often one of several: to shorten one of them alone gains nothing.
-        Not where tasks may be left out at a price: with all these ends none seems to be worth it.
+        Not where tasks may be left out, served late or beyond a range at a price: with all these
+        ends that price would be too low.
         """
         weight, ends = self.arrays.weight, self.routes.route[:, at.END]
-        if weight[at.BY_FINISH] > 0.0 and not self._rises.prizes:
+        priced = (self._rises.prizes or weight[at.BY_LATENESS] > 0.0
+                  or weight[at.BY_EXCESS] < math.inf)
+        if weight[at.BY_FINISH] > 0.0 and not priced:
             early = self._params.nearly_last * temperature / weight[at.BY_FINISH]
             weight[at.FINISH_FROM] = ends.max() - min(early, MOST_EARLY * ends.max())
             self.routes.sums[at.BEYOND] = np.maximum(0.0, ends - weight[at.FINISH_FROM]).sum()

@@ -24,7 +24,6 @@ from uav_task_alloc.solver.timed.order import route_order, true_cost
 from uav_task_alloc.solver.timed.ruin import (
     ABSENT,
     PATIENCE,
-    REMOVED,
     Round,
     begin_round,
     insert_removed,
@@ -159,8 +158,8 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
                             rises.skipped, rng)
         if rises.prizes and uniform(rng) < GENEROUS_RATE:
             generous += uniform(rng)
-        if (opening and a.unserved[seed - a.uavs] > 0.0  # else it is not among those removed
-                and w.counts[REMOVED] > 0 and r.link[seed, at.OF_UAV] == a.uavs):
+        if (opening and a.unserved[seed - a.uavs] > 0.0  # else it may not be among those removed
+                and r.link[seed, at.OF_UAV] == a.uavs):
             open_route(a, r, w, seed)
         limit = _limit(before, temperature, rng) if gives_up else math.inf
         insert_removed(a, r, w, generous, rises.by_value, rises.blinks, limit, rng)
