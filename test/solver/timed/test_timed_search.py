@@ -304,7 +304,7 @@ def test_all_ends_count_unless_something_else_has_a_price(prices, hard, count):
 
 
 @pytest.mark.parametrize('seed', range(6))
-def test_old_tasks_that_cost_less_than_nothing_to_leave_out_end_no_search(seed):
+def test_a_search_ends_where_leaving_out_old_tasks_costs_less_than_nothing(seed):
     r = random.Random(seed)
     fleet = [Uav(f'u{i}', (r.uniform(0.0, 1000.0), r.uniform(0.0, 1000.0), 0.0))
              for i in range(2)]
@@ -317,7 +317,7 @@ def test_old_tasks_that_cost_less_than_nothing_to_leave_out_end_no_search(seed):
     assert found.cost <= built.cost + 1e-9
 
 
-def test_a_uav_whose_locked_tasks_end_after_its_time_ends_no_search():
+def test_a_search_ends_where_locked_tasks_end_after_the_time_of_their_uav():
     fleet = [Uav('u', (0.0, 0.0, 0.0), available_until=10.0), Uav('v', (0.0, 9.0, 0.0))]
     work = [Task('a', (1000.0, 0.0, 0.0)), Task('b', (500.0, 0.0, 0.0))]
     found = plan(fleet, work, locked={'u': ('a',)}, budget=60.0, max_iterations=100)
