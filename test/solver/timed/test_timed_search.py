@@ -14,7 +14,7 @@ from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.solve import plan
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK
-from uav_task_alloc.solver.timed.colony import COLD, TimedColony
+from uav_task_alloc.solver.timed.colony import COLD, SELECTION, TimedColony
 from uav_task_alloc.solver.timed.insertion import near_place, unlink
 from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.places import cost_at
@@ -362,3 +362,21 @@ def test_a_round_inserts_by_value_and_chance():
         ratios |= set((-keys / a.unserved[w.removed[:keys.size] - a.uavs]).tolist())
     assert 0.5 <= min(ratios) < 0.7
     assert 1.3 < max(ratios) < 1.5
+
+
+def test_leaving_a_task_out_costs_much_more_than_serving_tasks_in_clusters():
+    corners = [(x, y) for x in (-1e3, 1e3) for y in (-1e3, 1e3)]
+    work = [Task(f't{x:g} {y:g} {i}', (x + i % 5, y + i // 5, 0.0), value=1.0 + i % 3,
+                 latest=300.0, service_time=120.0) for x, y in corners for i in range(20)]
+    fleet = [Uav('u', (0.0, 0.0, 0.0)), Uav('v', (0.0, 0.0, 0.0))]
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules()), {})
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, SELECTION)
+    before = colony.arrays.unserved.copy()
+    values = np.array([task.value for task in work])
+    colony.fly(0.0, 0.5, 200)
+    assert colony.arrays.unserved == pytest.approx(before)
+    colony.fly(0.7, 0.8, 0)
+    cost, worth = colony.best.score
+    most = np.maximum(before, 10.0 * cost / worth * values)
+    assert most.max() > 1.5 * before.max()
+    assert colony.arrays.unserved == pytest.approx(most)

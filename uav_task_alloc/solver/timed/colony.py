@@ -47,6 +47,7 @@ class TimedParams:
     absent: int = 10  # absent tasks that a round tries to insert, besides those it removes
     skipped: float = 0.0  # probability that a round passes over one of them
     by_value: float = 0.0  # share of rounds that insert about the most valuable tasks first
+    least_price: float = 0.0  # of a task after the restart, over what served ones cost by value
     nearly_last: float = 3.0  # temperatures before the last end of a route from which all count
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
     intensifies: bool = False  # where there are many tasks, also as an Intensifier does
@@ -57,7 +58,7 @@ COLD = TimedParams(intensifies=True)
 SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
                         short_end_temperature=1.3, restart=0.6,
                         reheat_temperature=6.0, ruin=10.0, skipped=0.3, by_value=0.3,
-                        first_price=math.inf)
+                        least_price=10.0, first_price=math.inf)
 WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
                    short_end_temperature=0.02, first_price=math.inf)
 # many tasks are new: half of the time each from the earlier routes, and from new ones
@@ -118,6 +119,17 @@ class TimedColony:
         self._rises = self._rises._replace(least=np.full(4, math.inf), most=np.full(4, math.inf))
         self._params, self._gains = replace(self._params, restart=GIVING_UP), 1
 
+    def _raise_prices(self) -> None:
+        """Let a task left out cost much more than those served cost, each by its value.
+
+        Its first price follows the legs between neighbours, which are short where tasks lie in
+        clusters: routes that serve less value could cost less than those that serve more.
+        """
+        a, (cost, worth) = self.arrays, self.best.score.tolist()
+        if self._params.least_price > 0.0 and worth > 0.0:
+            least = self._params.least_price * cost / worth * a.fixed[a.uavs:a.ends, at.WORTH]
+            np.maximum(a.unserved, least, out=a.unserved, where=a.unserved > 0.0)
+
     def _intensify(self, intensifier: Intensifier, spent: float) -> None:
         """Improve the routes after this share of the budget, apart from rounds of search."""
         if intensifier.is_due(spent):
@@ -174,6 +186,7 @@ class TimedColony:
             self._forbid_excess()
         if spent >= self._params.restart and not self._restarted:
             self._restarted = True
+            self._raise_prices()
             if self._begin is not None:
                 self._end_temperature = COLD.short_end_temperature
             set_order(self.arrays, self.routes, (self._begin or self.best).order)
