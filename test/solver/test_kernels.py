@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kernels: sums stay consistent, undo restores the routes, neighbours are the nearest."""
+import math
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,7 +15,14 @@ from uav_task_alloc.solver.insertion import insert_cheapest_first
 from uav_task_alloc.solver.neighbours import find_nearest
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.rng import below, rng_state, uniform
-from uav_task_alloc.solver.routes import DISTANCE, copy, empty_routes, leg_length
+from uav_task_alloc.solver.routes import (
+    DISTANCE,
+    copy,
+    empty_routes,
+    leg_length,
+    total_cost,
+    update_sums,
+)
 from uav_task_alloc.solver.ruin import empty_log, recreate, ruin, undo
 
 NO_NEW = np.empty(0, np.int64)
@@ -43,7 +51,7 @@ def test_sums_stay_consistent_and_undo_restores_the_routes(seed, tasks, returns)
         before = copy(routes)
         log.last_ruined[:] = -1
         ruin(problem.arrays, routes, log, 10.0, i, rng)
-        recreate(problem.arrays, routes, log, rng)
+        recreate(problem.arrays, routes, log, math.inf, rng)
         assert routes.length == pytest.approx(lengths(problem, routes), abs=1e-6)
         assert routes.sums[DISTANCE] == pytest.approx(sum(lengths(problem, routes)), abs=1e-6)
         nodes = slice(problem.arrays.uavs, problem.arrays.ends)
@@ -54,6 +62,31 @@ def test_sums_stay_consistent_and_undo_restores_the_routes(seed, tasks, returns)
             flown = before.uav_of >= 0  # what is in no route has no next node
             assert (routes.next == before.next)[flown].all()
             assert routes.length == pytest.approx(before.length, abs=1e-6)
+
+
+@pytest.mark.parametrize(('reach', 'hard'), [(1e9, True), (4000.0, True), (2500.0, False)])
+def test_a_round_that_is_given_up_would_not_have_cost_less_than_the_limit(reach, hard):
+    problem = random_problem(4, 60, 5, reach, returns=True, hard=hard)
+    a, rng = problem.arrays, rng_state(5)
+    routes, log = empty_routes(a), empty_log(a)
+    insert_cheapest_first(a, routes, rng)
+    update_sums(a, routes)
+    given_up = 0
+    for _ in range(300):
+        before, chance, ends = total_cost(a, routes), rng.copy(), []
+        for limit in (before, math.inf):
+            rng[:] = chance
+            log.last_ruined[:] = -1
+            ruin(a, routes, log, 10.0, 1, rng)
+            recreate(a, routes, log, limit, rng)
+            served = int((routes.uav_of[a.uavs:a.ends] >= 0).sum())
+            ends.append((served, total_cost(a, routes)))
+            if limit < math.inf or ends[-1][1] >= before:
+                undo(a, routes, log)
+                update_sums(a, routes)
+        given_up += ends[0] != pytest.approx(ends[1])
+        assert ends[0] == pytest.approx(ends[1]) or ends[1][1] >= before - 1e-6
+    assert given_up > 30
 
 
 @pytest.mark.parametrize('n', [1, 2, 7, 200])

@@ -23,6 +23,7 @@ from uav_task_alloc.solver.routes import (
     Routes,
     insert,
     remove,
+    total_cost_kernel,
 )
 
 MAX_STRING = 10  # tasks in a string at most
@@ -211,11 +212,19 @@ def _sort_removed(a: Arrays, log: RuinLog, rng: RngState) -> None:
 
 
 @inline_kernel
-def recreate(a: Arrays, r: Routes, log: RuinLog, rng: RngState) -> None:
-    """Insert removed tasks where each costs least, if less than not serving it. O(removed k)."""
+def recreate(a: Arrays, r: Routes, log: RuinLog, limit: float, rng: RngState) -> None:
+    """Insert removed tasks where each costs least, if less than not serving it. O(removed k).
+
+    limit: ends where all would cost that much [m] even if the rest cost nothing.
+    """
     _sort_removed(a, log, rng)
     for i in range(log.counts[1]):
+        limit += a.unassigned_cost[log.removed[i] - a.uavs]  # of those that wait
+    for i in range(log.counts[1]):
         t = log.removed[i]
+        if total_cost_kernel(a, r) >= limit:
+            break
+        limit -= a.unassigned_cost[t - a.uavs]
         place, delta = best_near_place(a, r, t, _PLACES, BLINK_RATE, rng)
         if place < 0 and (a.restricted[t - a.uavs] or not a.hard):
             place, delta = best_place(a, r, t)

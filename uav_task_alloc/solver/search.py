@@ -81,8 +81,9 @@ def search(a: Arrays, r: Routes, best: Routes, log: RuinLog, pool: Pool, mean: f
             log.counts[4] = _update_penalties(a, r, log, pool)
         before = total_cost_kernel(a, r)
         ruin(a, r, log, mean, i, rng)
-        recreate(a, r, log, rng)
-        if total_cost_kernel(a, r) < before - temperature * math.log(1.0 - uniform(rng)):
+        limit = before - temperature * math.log(1.0 - uniform(rng))
+        recreate(a, r, log, limit, rng)
+        if total_cost_kernel(a, r) < limit:
             if is_better_kernel(a, r, best):
                 copy_into(r, best)
                 improvements += 1
