@@ -2,6 +2,7 @@
 """Experiment on warm starts: tasks arrive, UAVs move, each plan continues the one before."""
 from __future__ import annotations
 
+import sys
 import time
 from dataclasses import replace
 from functools import partial
@@ -16,7 +17,8 @@ from uav_task_alloc.study.instances import SIDE, Instance, make_instance
 _ARRIVALS = 5  # tasks at each event
 _STEP = 300.0  # [m] flown between events
 _RANGE_FACTOR = 1.5  # ranges over those of the instance, as more tasks arrive
-_SEED = 11  # of the instance and the arrivals; not used for tuning
+_SEED = 11  # of the first instance and its arrivals; not used for tuning
+_EVENTS = 50  # of an instance at most: by then the ranges are used up
 # effort over that of the plan measured at an event:
 _REFERENCE_FACTOR = 20  # of the reference plan
 _ITERATIONS_BETWEEN = 5  # of the search until the next event in `compare`
@@ -27,6 +29,8 @@ _FIRST_PLAN_FACTOR = 100.0  # of the plan before the first event
 def run_events(budget: float = 0.02, runs: int = 50, size: str = '20x200') -> None:
     """Print the time to the first valid plan at an event, and the gap to a longer solve.
 
+    After 50 events, when the ranges are used up, the next instance begins with full ones.
+
     Args:
         budget: [s] of CPU time of a plan.
         runs: number of events.
@@ -35,16 +39,23 @@ def run_events(budget: float = 0.02, runs: int = 50, size: str = '20x200') -> No
     load_kernels()
     uavs, tasks = (int(each) for each in size.split('x'))
     for one_base in (False, True):
-        gaps, first = _measure_events(uavs, tasks, one_base, budget, runs)
         kind = 'one base' if one_base else 'spread'
+        gaps, first = list[float](), list[float]()
+        for chain, before in enumerate(range(0, runs, _EVENTS)):
+            instance = make_instance(uavs, tasks, _SEED + chain, one_base)
+            found = _measure_events(instance, _SEED + chain, budget, min(_EVENTS, runs - before))
+            gaps += found[0]
+            first += found[1]
+            print(f'{kind}: {len(gaps)} of {runs} events', file=sys.stderr, flush=True)
         print(f'{kind}: first plan {1e3 * np.median(first):.1f} ms (worst '
               f'{1e3 * max(first):.1f}), gap at {1e3 * budget:g} ms: median '
               f'{np.median(gaps):.2f} %, worst {max(gaps):.2f} %', flush=True)
 
 
-def _measure_events(uavs: int, tasks: int, one_base: bool, budget: float,
-           runs: int) -> tuple[list[float], list[float]]:
-    instance, rng = make_instance(uavs, tasks, _SEED, one_base), np.random.default_rng(_SEED)
+def _measure_events(instance: Instance, seed: int, budget: float,
+                    runs: int) -> tuple[list[float], list[float]]:
+    """Gaps [%] and seconds to the first plans of events of one instance."""
+    rng = np.random.default_rng(seed)
     fleet = tuple(replace(uav, range=_RANGE_FACTOR * uav.range) for uav in instance.uavs)
     work = instance.tasks
     solve = partial(plan, clock=time.process_time)
@@ -105,8 +116,8 @@ def compare(instance: Instance, seed: int, iterations: int, count: int) -> list[
 
 def _gap_percent(result: Plan, best: Plan) -> float:
     """[%] by which a plan is longer than the best; a unit of value left out counts as 100 %."""
-    return (100.0 * (best.value - result.value)
-            + 100.0 * (result.distance / best.distance - 1.0))
+    longer = result.distance / best.distance - 1.0 if best.distance > 0.0 else 0.0  # none served
+    return 100.0 * (best.value - result.value) + 100.0 * longer
 
 
 def _advance(fleet: tuple[Uav, ...], work: tuple[Task, ...],
