@@ -15,6 +15,13 @@ def test_plans_are_valid_and_as_good_as_the_optimum(first):
         assert result is None or result.gap < 1e-6, seed
 
 
+def test_a_first_trip_without_tasks_gets_one_again():
+    problem = small_problem(130529)  # a UAV in the air with little range left, more from home
+    result = compare_small(problem, rounds=1000)
+    assert result.faults == ()
+    assert result.gap < 1e-6
+
+
 def test_a_wrong_plan_is_noticed():
     problem = small_problem(3)
     result = problem.solve(100)

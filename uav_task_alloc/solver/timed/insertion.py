@@ -101,6 +101,18 @@ def _place_beside(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
 
 
 @inline_kernel
+def _with_empty_first_trip(a: TimedArrays, r: TimedRoutes, c: int) -> int:
+    """The UAV of a route with node c that begins with a visit of the base; -1: not so. O(1).
+
+    No task is beside the place before that visit.
+    """
+    if a.visits == 0:
+        return -1
+    u = r.link[c, at.OF_UAV]
+    return SIGNED(u) if u < a.uavs and r.link[u, at.NEXT] >= a.bases else -1
+
+
+@inline_kernel
 def _within_reach(a: TimedArrays, r: TimedRoutes, i: int, side: int, least: float) -> int:
     """The first of these sides of neighbours of task i where a place may cost less. O(k).
 
@@ -137,6 +149,9 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
             break
         if m < sides:
             before = _place_beside(a, r, t, m, least)
+            u = _with_empty_first_trip(a, r, a.near[i, m >> 1])
+            if u >= 0:
+                place, kind, least = try_place(a, r, t, LINK(u), place, kind, least)
         else:
             k = a.near_class[i, m - sides]
             before = idle_uav(a, r, k) if k >= 0 else -1
