@@ -14,7 +14,7 @@ from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.solve import plan
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK
-from uav_task_alloc.solver.timed.colony import COLD, SELECTION, TimedColony
+from uav_task_alloc.solver.timed.colony import COLD, TimedColony
 from uav_task_alloc.solver.timed.insertion import near_place, unlink
 from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.places import cost_at
@@ -24,7 +24,6 @@ from uav_task_alloc.solver.timed.ruin import (
     begin_round,
     empty_round,
     insert_removed,
-    list_absent,
     ruin_strings,
     save_route,
     take_back,
@@ -322,61 +321,3 @@ def test_a_search_ends_where_locked_tasks_end_after_the_time_of_their_uav():
     work = [Task('a', (1000.0, 0.0, 0.0)), Task('b', (500.0, 0.0, 0.0))]
     found = plan(fleet, work, locked={'u': ('a',)}, budget=60.0, max_iterations=100)
     assert found.routes['u'][0] == 'a'
-
-
-def selection_problem():
-    """A UAV that reaches few of the tasks in time."""
-    work = [Task(f't{i}', (10.0 + i, 0.0, 0.0), latest=3.0, value=1.0 + i) for i in range(30)]
-    fleet = [Uav('u', (0.0, 0.0, 0.0), cruise_speed=5.0)]
-    return make_timed(make_problem(fleet, work, {}, Limits(), Rules()), {})
-
-
-@pytest.mark.parametrize(('skipped', 'most'), [(0.0, 10), (1.0, 1)])
-def test_a_round_passes_over_absent_tasks_but_the_one_it_starts_at(skipped, most):
-    problem = selection_problem()
-    a, routes, found = problem.arrays, empty_timed_routes(problem.arrays), set()
-    start, w, rng = first_plan(problem, WarmState()), empty_round(problem.arrays), rng_state(1)
-    absent = start.order == np.arange(len(start.order))
-    for _ in range(200):
-        set_order(a, routes, start.order)
-        list_absent(a, routes, w)
-        begin_round(routes, w)
-        ruin_strings(a, routes, w, 10.0, 10, skipped, rng)
-        found.add(int(absent[w.removed[:w.counts[REMOVED]]].sum()))
-    assert max(found) == most
-
-
-def test_a_round_inserts_by_value_and_chance():
-    problem = selection_problem()
-    a, routes = problem.arrays, empty_timed_routes(problem.arrays)
-    start, w, rng = first_plan(problem, WarmState()), empty_round(a), rng_state(1)
-    ratios = set()
-    for _ in range(20):
-        set_order(a, routes, start.order)
-        list_absent(a, routes, w)
-        begin_round(routes, w)
-        ruin_strings(a, routes, w, 10.0, 10, 0.0, rng)
-        insert_removed(a, routes, w, 1.0, 1.0, 0.01, math.inf, rng)
-        keys = w.order[:w.counts[REMOVED]]
-        assert (np.diff(keys) >= 0.0).all()
-        ratios |= set((-keys / a.unserved[w.removed[:keys.size] - a.uavs]).tolist())
-    assert 0.5 <= min(ratios) < 0.7
-    assert 1.3 < max(ratios) < 1.5
-
-
-def test_leaving_a_task_out_costs_much_more_than_serving_tasks_in_clusters():
-    corners = [(x, y) for x in (-1e3, 1e3) for y in (-1e3, 1e3)]
-    work = [Task(f't{x:g} {y:g} {i}', (x + i % 5, y + i // 5, 0.0), value=1.0 + i % 3,
-                 latest=300.0, service_time=120.0) for x, y in corners for i in range(20)]
-    fleet = [Uav('u', (0.0, 0.0, 0.0)), Uav('v', (0.0, 0.0, 0.0))]
-    problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules()), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, SELECTION)
-    before = colony.arrays.unserved.copy()
-    values = np.array([task.value for task in work])
-    colony.fly(0.0, 0.5, 200)
-    assert colony.arrays.unserved == pytest.approx(before)
-    colony.fly(0.7, 0.8, 0)
-    cost, worth = colony.best.score
-    most = np.maximum(before, 10.0 * cost / worth * values)
-    assert most.max() > 1.5 * before.max()
-    assert colony.arrays.unserved == pytest.approx(most)
