@@ -58,7 +58,7 @@ COLD = TimedParams(intensifies=True)
 SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
                         short_end_temperature=1.3, restart=0.6,
                         reheat_temperature=6.0, ruin=10.0, skipped=0.3, by_value=0.3,
-                        least_price=10.0, first_price=math.inf)
+                        least_price=15.0, first_price=math.inf)
 WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
                    short_end_temperature=0.02, first_price=math.inf)
 # many tasks are new: half of the time each from the earlier routes, and from new ones
@@ -123,12 +123,16 @@ class TimedColony:
         """Let a task left out cost much more than those served cost, each by its value.
 
         Its first price follows the legs between neighbours, which are short where tasks lie in
-        clusters: routes that serve less value could cost less than those that serve more.
+        clusters: routes that serve less value could cost less than those that serve more, and the
+        temperatures, which follow them too, are low. They rise as much as the prices do.
         """
         a, (cost, worth) = self.arrays, self.best.score.tolist()
-        if self._params.least_price > 0.0 and worth > 0.0:
+        some = a.unserved > 0.0
+        if self._params.least_price > 0.0 and worth > 0.0 and some.any():
             least = self._params.least_price * cost / worth * a.fixed[a.uavs:a.ends, at.WORTH]
-            np.maximum(a.unserved, least, out=a.unserved, where=a.unserved > 0.0)
+            before = a.unserved[some].sum()
+            np.maximum(a.unserved, least, out=a.unserved, where=some)
+            self._scale *= float(a.unserved[some].sum() / before)
 
     def _intensify(self, intensifier: Intensifier, spent: float) -> None:
         """Improve the routes after this share of the budget, apart from rounds of search."""
