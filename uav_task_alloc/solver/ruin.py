@@ -215,7 +215,8 @@ def _sort_removed(a: Arrays, log: RuinLog, rng: RngState) -> None:
 def recreate(a: Arrays, r: Routes, log: RuinLog, limit: float, rng: RngState) -> None:
     """Insert removed tasks where each costs least, if less than not serving it. O(removed k).
 
-    limit: ends where all would cost that much [m] even if the rest cost nothing.
+    limit: the round is given up once the cost [m] cannot be below that any more, even if the tasks
+    that are still to be inserted cost nothing.
     """
     _sort_removed(a, log, rng)
     for i in range(log.counts[1]):

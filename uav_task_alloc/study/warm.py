@@ -18,7 +18,7 @@ _ARRIVALS = 5  # tasks at each event
 _STEP = 300.0  # [m] flown between events
 _RANGE_FACTOR = 1.5  # ranges over those of the instance, as more tasks arrive
 _SEED = 11  # of the first instance and its arrivals; not used for tuning
-_EVENTS = 50  # of an instance at most: by then the ranges are used up
+_EVENTS = 50  # of an instance at most: of 20 UAVs and 200 tasks the ranges are used up by then
 # effort over that of the plan measured at an event:
 _REFERENCE_FACTOR = 20  # of the reference plan
 _ITERATIONS_BETWEEN = 5  # of the search until the next event in `compare`
@@ -29,7 +29,8 @@ _FIRST_PLAN_FACTOR = 100.0  # of the plan before the first event
 def run_events(budget: float = 0.02, runs: int = 50, size: str = '20x200') -> None:
     """Print the time to the first valid plan at an event, and the gap to a longer solve.
 
-    After 50 events, when the ranges are used up, the next instance begins with full ones.
+    After 50 events the next instance begins, with full ranges: of 20 UAVs and 200 tasks they are
+    used up by then.
 
     Args:
         budget: [s] of CPU time of a plan.

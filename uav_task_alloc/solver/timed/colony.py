@@ -58,7 +58,7 @@ COLD = TimedParams(intensifies=True)
 SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
                         short_end_temperature=1.3, restart=0.6,
                         reheat_temperature=6.0, ruin=10.0, skipped=0.3, by_value=0.3,
-                        least_price=15.0, first_price=math.inf)
+                        least_price=10.0, first_price=math.inf)
 WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
                    short_end_temperature=0.02, first_price=math.inf)
 # many tasks are new: half of the time each from the earlier routes, and from new ones
@@ -124,14 +124,16 @@ class TimedColony:
 
         Its first price follows the legs between neighbours, which are short where tasks lie in
         clusters: routes that serve less value could cost less than those that serve more, and the
-        temperatures, which follow them too, are low. They rise as much as the prices do.
+        temperatures, which follow those legs too, are low. Both rise by the same factor.
         """
         a, (cost, worth) = self.arrays, self.best.score.tolist()
         some = a.unserved > 0.0
         if self._params.least_price > 0.0 and worth > 0.0 and some.any():
-            least = self._params.least_price * cost / worth * a.fixed[a.uavs:a.ends, at.WORTH]
-            before = a.unserved[some].sum()
+            rows, before = a.fixed[a.uavs:a.ends], a.unserved[some].sum()
+            least = self._params.least_price * cost / worth * rows[:, at.WORTH]
+            least += rows[:, at.WEIGHT] * rows[:, at.ANNOUNCED]  # as at first
             np.maximum(a.unserved, least, out=a.unserved, where=some)
+            np.maximum(self._rises.max_unserved, a.unserved, out=self._rises.max_unserved)
             self._scale *= float(a.unserved[some].sum() / before)
 
     def _intensify(self, intensifier: Intensifier, spent: float) -> None:

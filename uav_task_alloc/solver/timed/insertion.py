@@ -138,7 +138,8 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
 
     TURNED is part of the kind.
 
-    opens: empty routes are tried, too. Each place is skipped with probability `blinks`.
+    opens: empty routes are tried, too. Each place is skipped with probability `blinks`, but for
+    an empty first trip.
     """
     i, place, kind, least = t - a.uavs, -1, NO_VISIT, math.inf
     sides, m = 2 * a.near_count[i], -1
@@ -149,7 +150,7 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
             break
         if m < sides:
             before = _place_beside(a, r, t, m, least)
-            u = _with_empty_first_trip(a, r, a.near[i, m >> 1])
+            u = _with_empty_first_trip(a, r, a.near[i, m >> 1]) if m & 1 == 0 else -1
             if u >= 0:
                 place, kind, least = try_place(a, r, t, LINK(u), place, kind, least)
         else:
