@@ -10,7 +10,8 @@ from scenes import CLEARANCE, random_point, random_zones
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry import distances
 from uav_task_alloc.geometry.detour import detour
-from uav_task_alloc.geometry.distances import Distances, length
+from uav_task_alloc.geometry.distances import Distances
+from uav_task_alloc.geometry.pairs import length
 from uav_task_alloc.model import ThreatZone
 
 

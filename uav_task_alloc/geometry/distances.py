@@ -1,224 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lengths of safe paths between numbered points, for kernels: known, or searched for when needed.
+"""Lengths and legs of safe paths between numbered points; new points and zones keep what is valid.
 
-`length(pairs, i, j)` may be called in any kernel, also without the GIL. Up to DENSE_MAX points the
-lengths fill a square table (NaN: not known yet); beyond, there is a cache of the last ones. A path
-not found within the budget counts as none until a greater budget is allowed.
+Kernels read and search lengths through `Distances.pairs`. A path not found within the budget
+counts as none until a greater budget is allowed.
 """
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import as_points, check_limits, path_between
-from uav_task_alloc.geometry.numba_pointers import call_float, floats_at, ints_at
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, containing_zones, pack
-from uav_task_alloc.geometry.path_store import PathStore, store_path
-from uav_task_alloc.geometry.points import path_length, reverse_points
+from uav_task_alloc.geometry.obstacles import Obstacles, containing_zones, pack
+from uav_task_alloc.geometry.pairs import (
+    CACHE_SIZE,
+    Pairs,
+    ensure_lengths,
+    known_length,
+    length,
+    take_path,
+)
+from uav_task_alloc.geometry.path_store import PathStore
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.geometry.scene import (
-    BUDGET_INDEX,
     INSIDE,
-    LOCATION_INDEX,
-    WITHIN_SKIN,
     find_address,
     join_address,
     make_scene,
     scene_addresses,
-    scene_at,
-    stored_ends,
     stored_path,
 )
-from uav_task_alloc.geometry.search_budget import CUT_SHORT, EXHAUSTED, MAX_UNITS, SearchBudget
-from uav_task_alloc.geometry.shortest_path import path_clears
+from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.geometry.table import LengthTable, invalidate
 from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
 DENSE_MAX = 2048  # points; the table takes 8 n^2 bytes
-CACHE_SIZE = 1 << 20  # lengths kept beyond that; a power of two
 MAX_CHECKS = 20_000_000  # of pairs against changed zones; beyond, the table starts empty
-
-
-class _Addresses(NamedTuple):
-    """Sizes and addresses; numba_pointers.py says why."""
-
-    points: int
-    zones: int
-    xyz: int  # float64 (points, 3) [m]
-    row: int  # length of a row of the table; 0: no table
-    slot: int  # int64: row and column of each point in the table
-    table: int  # float64 [m], NaN: unknown
-    keys: int  # int64: i * points + j of each length in the cache
-    lengths: int  # float64 [m]
-    scene: int  # what `find` reads
-    find: int  # C function (scene, i, j) -> length [m]; 0 where there are no zones
-    join: int  # C function (scene, i, k << 32 | j) -> length [m]; 0 where there are no zones
-
-
-class Pairs(_Addresses):
-    """What `length` needs inside a kernel; made by Distances, opaque to all others."""
-
-    owner: object  # keeps alive what the addresses point to
-
-    def __reduce__(self) -> str:
-        raise TypeError('Pairs hold addresses of this process: make new Distances there')
-
-
-@allocating_kernel
-def length(pairs: Pairs, i: int, j: int) -> float:
-    """Return the length of the shortest safe path between two points; O(1) once known.
-
-    Args:
-        pairs: arrays of `Distances`, of n points; found lengths are stored in them.
-        i: of the point to start from, in 0..n-1.
-        j: of the point to reach, in 0..n-1.
-
-    Returns:
-        [m]; inf: no path was found.
-    """
-    if pairs.row > 0:
-        slot = ints_at(pairs.slot)
-        known = floats_at(pairs.table)[slot[i] * pairs.row + slot[j]]
-        return known if known >= 0.0 else _find_for_table(pairs, i, j)
-    if pairs.zones > 0:
-        return _find_for_cache(pairs, i, j)
-    xyz = floats_at(pairs.xyz)
-    dx, dy, dz = xyz[3 * i] - xyz[3 * j], xyz[3 * i + 1] - xyz[3 * j + 1], xyz[
-        3 * i + 2] - xyz[3 * j + 2]
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@inner_allocating_kernel
-def _search_length(pairs: Pairs, i: int, j: int, known: float) -> float:
-    """Search for a length now; `known` is what an earlier search left that was cut short.
-
-    Returns:
-        [m]; -w - 1: not found with w units of work; NaN: there was no time to search.
-    """
-    state = ints_at(ints_at(pairs.scene)[BUDGET_INDEX])
-    if state[EXHAUSTED] != 0:
-        return known
-    if -known > state[MAX_UNITS]:
-        state[CUT_SHORT] += 1
-        return known
-    found = call_float(pairs.find, pairs.scene, i, j)
-    if found == found:
-        return float(found)
-    state[CUT_SHORT] += 1
-    return known if state[EXHAUSTED] != 0 else -1.0 - state[MAX_UNITS]
-
-
-@inner_allocating_kernel
-def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
-    """As `length`, where the table does not have it yet."""
-    slot, table = ints_at(pairs.slot), floats_at(pairs.table)
-    place = slot[i] * pairs.row + slot[j]
-    found = _search_length(pairs, i, j, table[place])
-    table[place] = found
-    location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
-    if location[i] != INSIDE and location[j] != INSIDE:
-        table[slot[j] * pairs.row + slot[i]] = found
-    return found if found >= 0.0 else np.inf
-
-
-@inner_allocating_kernel
-def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
-    """As `length`, with the cache instead of the table."""
-    keys, lengths = ints_at(pairs.keys), floats_at(pairs.lengths)
-    location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
-    if j < i and location[i] != INSIDE and location[j] != INSIDE:
-        i, j = j, i
-    key = i * pairs.points + j
-    place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
-    if keys[place] == key and lengths[place] >= 0.0:
-        return float(lengths[place])
-    found = _search_length(pairs, i, j, lengths[place] if keys[place] == key else np.nan)
-    if found == found:
-        keys[place], lengths[place] = key, found
-    return found if found >= 0.0 else np.inf
-
-
-@allocating_kernel
-def _known_length(pairs: Pairs, i: int, j: int) -> float:
-    """The length [m] if it is known; NaN or negative otherwise. O(1)"""
-    if pairs.row > 0:
-        slot = ints_at(pairs.slot)
-        return float(floats_at(pairs.table)[slot[i] * pairs.row + slot[j]])
-    if pairs.zones == 0:
-        return length(pairs, i, j)
-    keys, lengths = ints_at(pairs.keys), floats_at(pairs.lengths)
-    for a, b in ((i, j), (j, i)):
-        key = a * pairs.points + b
-        place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
-        if keys[place] == key:
-            return float(lengths[place])
-    return np.nan
-
-
-@inner_allocating_kernel
-def _store_length(pairs: Pairs, i: int, j: int, found: float) -> None:
-    """Store the length of a path from i to j, which is outside all zones. O(1)"""
-    location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
-    if pairs.row > 0:
-        slot, table = ints_at(pairs.slot), floats_at(pairs.table)
-        table[slot[i] * pairs.row + slot[j]] = found
-        if location[i] != INSIDE:
-            table[slot[j] * pairs.row + slot[i]] = found
-    elif pairs.zones > 0:
-        key = (i * pairs.points + j if location[i] == INSIDE
-               else min(i, j) * pairs.points + max(i, j))
-        place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
-        ints_at(pairs.keys)[place], floats_at(pairs.lengths)[place] = key, found
-
-
-@inner_allocating_kernel
-def length_via(pairs: Pairs, i: int, k: int, j: int) -> float:
-    """Return the length of the path from i to j, or over point k where none is known.
-
-    Args:
-        pairs: arrays of `Distances`, of n points; found lengths are stored in them.
-        i: of the point to start from, in 0..n-1.
-        k: of a point between, in 0..n-1.
-        j: of the point to reach, in 0..n-1.
-
-    Returns:
-        [m]; inf: nor are the paths from i to k and from k to j known.
-    """
-    found = length(pairs, i, j)
-    if found < np.inf or pairs.zones == 0:
-        return found
-    found = call_float(pairs.join, pairs.scene, i, (k << 32) | j)
-    if found < np.inf:
-        _store_length(pairs, i, j, found)
-    return float(found)
-
-
-@allocating_kernel
-def _ensure(pairs: Pairs, origins: Ints, goals: Ints) -> None:
-    """Search for the lengths of all pairs (origins[m], goals[m]), int64 (n,)."""
-    for m in range(origins.size):
-        length(pairs, origins[m], goals[m])
-
-
-@allocating_kernel
-def _take_path(pairs: Pairs, i: int, j: int, path: Floats, n: int) -> bool:
-    """Store path[:n] from i to j, if it is clear, or leave it reversed; O(zones n)."""
-    scene, ends = scene_at(pairs.scene), np.empty((2, 3))
-    if stored_ends(scene, i, j, ends):
-        reverse_points(path, 0, n)
-    no_skin = scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN
-    if not path_clears(scene.zones, path, n, min(ends[0, 2], ends[1, 2]), no_skin):
-        return False
-    store_path(scene.store, path, n, ends)
-    _store_length(pairs, i, j, path_length(path, n))
-    return True
 
 
 class Distances:
@@ -318,8 +139,8 @@ class Distances:
             origins: (n,) indices of points.
             goals: (n,) indices of points.
         """
-        _ensure(self.pairs, np.asarray(origins, dtype=np.int64).ravel(),
-                np.asarray(goals, dtype=np.int64).ravel())
+        ensure_lengths(self.pairs, np.asarray(origins, dtype=np.int64).ravel(),
+                       np.asarray(goals, dtype=np.int64).ravel())
 
     def offer_path(self, i: int, j: int, via: Sequence[Point]) -> bool:
         """Take a path from i to j, or its remainder from one of its points on, if that is clear.
@@ -340,7 +161,7 @@ class Distances:
         for first in range(len(via) + 1 if len(via) < MAX_CORNERS - 1 else 0):
             rest = [self._point(i), *via[first:], self._point(j)]
             path[:len(rest)] = rest
-            if _take_path(self.pairs, i, j, path, len(rest)):
+            if take_path(self.pairs, i, j, path, len(rest)):
                 return True
         return False
 
@@ -362,7 +183,7 @@ class Distances:
             return Leg((), 0.0)
         if scene.location[j] == INSIDE:
             return Leg((), math.inf)
-        known = _known_length(self.pairs, i, j)
+        known = known_length(self.pairs, i, j)
         if known >= 0.0:
             path = np.empty((MAX_CORNERS, 3))
             n = stored_path(scene, i, j, path)
@@ -376,7 +197,7 @@ class Distances:
 
     def given_up(self, i: int, j: int) -> bool:
         """Whether the path from i to j was not found in the time; there may be one."""
-        return bool(self.zones) and not _known_length(self.pairs, i, j) >= 0.0 and (
+        return bool(self.zones) and not known_length(self.pairs, i, j) >= 0.0 and (
             bool(self._scene.location[j] != INSIDE) and i != j)
 
     def is_inside(self, i: int) -> bool:

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.geometry.distances import Pairs, length, length_via
 from uav_task_alloc.geometry.outline import Floats as Floats, Ints as Ints
+from uav_task_alloc.geometry.pairs import Pairs, length, length_via
 from uav_task_alloc.kernel import inline_kernel, kernel
 
 Nodes = NDArray[np.uint32]  # unsigned: numba omits the check for negative indices

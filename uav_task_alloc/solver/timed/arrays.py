@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.geometry.distances import Pairs
 from uav_task_alloc.geometry.outline import Floats, Ints
+from uav_task_alloc.geometry.pairs import Pairs
 from uav_task_alloc.solver.timed.path_times import PathTimes
 
 Links = NDArray[np.uint32]  # unsigned: numba omits the check for negative indices

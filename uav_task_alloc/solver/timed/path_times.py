@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.geometry.distances import Distances, Pairs
+from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.geometry.numba_pointers import call_float, floats_at, ints_at
+from uav_task_alloc.geometry.pairs import Pairs
 from uav_task_alloc.geometry.scene import time_address
 from uav_task_alloc.kernel import inner_allocating_kernel
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.geometry.distances import length
 from uav_task_alloc.geometry.outline import Floats
+from uav_task_alloc.geometry.pairs import length
 from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TOLERANCE, TimedArrays, TimedRoutes
