@@ -28,7 +28,8 @@ sys.path[:0] = [str(ROOT)]
 from uav_task_alloc.objective import OBJECTIVES  # noqa: E402
 from uav_task_alloc.solver.problem import Rules  # noqa: E402
 from uav_task_alloc.solver.solve import plan  # noqa: E402
-from uav_task_alloc.solver.timed.evaluator import Held, evaluate_routes  # noqa: E402
+from uav_task_alloc.solver.timed.evaluator import evaluate_routes  # noqa: E402
+from uav_task_alloc.solver.timed.schedule import Held  # noqa: E402
 from uav_task_alloc.solver.timed.solve import load_timed_kernels  # noqa: E402
 from uav_task_alloc.study.lines import left_after_loss, pyvrp_lines, random_lines  # noqa: E402
 from uav_task_alloc.study.tables import markdown_rows  # noqa: E402

@@ -8,7 +8,8 @@ import pytest
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.timed.evaluator import Held, evaluate_routes
+from uav_task_alloc.solver.timed.evaluator import evaluate_routes
+from uav_task_alloc.solver.timed.schedule import Held
 from uav_task_alloc.study import exact
 from uav_task_alloc.study.exact import exact_plan
 from uav_task_alloc.study.small_problems import small_problem

@@ -18,13 +18,8 @@ from uav_task_alloc.geometry.flight_time import service_seconds
 from uav_task_alloc.model import Task, Uav, turned_tasks
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.timed.evaluator import (
-    Held,
-    LegOf,
-    TimedEvaluation,
-    evaluate_routes,
-    straight_legs,
-)
+from uav_task_alloc.solver.timed.evaluator import TimedEvaluation, evaluate_routes
+from uav_task_alloc.solver.timed.schedule import Held, LegOf, straight_legs
 
 Rows = tuple[tuple[str, ...], ...]  # task ids of each trip
 

@@ -21,7 +21,8 @@ from uav_task_alloc.model import Plan, Point, Task, Uav
 from uav_task_alloc.objective import OBJECTIVES, Objective, check_objective, needs_time
 from uav_task_alloc.solver.problem import Rules
 from uav_task_alloc.solver.solve import plan
-from uav_task_alloc.solver.timed.evaluator import Held, TimedEvaluation, evaluate_routes
+from uav_task_alloc.solver.timed.evaluator import TimedEvaluation, evaluate_routes
+from uav_task_alloc.solver.timed.schedule import Held
 from uav_task_alloc.study.exact import exact_plan, rank
 
 SMALL_SIDE = 1000.0  # [m]

@@ -15,7 +15,8 @@ from uav_task_alloc.separation.conflicts import find_conflicts
 from uav_task_alloc.separation.volumes import flight_volumes
 from uav_task_alloc.solver.problem import Rules
 from uav_task_alloc.solver.separated import flights_of_plan
-from uav_task_alloc.solver.timed.evaluator import Held, evaluate_routes
+from uav_task_alloc.solver.timed.evaluator import evaluate_routes
+from uav_task_alloc.solver.timed.schedule import Held
 from uav_task_alloc.study.lines import left_after_loss, random_lines
 from uav_task_alloc.study.small_problems import compare_small, small_problem
 

@@ -15,6 +15,7 @@ from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, node_count
 from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
+from uav_task_alloc.solver.timed.route_sums import cost_of
 from uav_task_alloc.solver.timed.ruin import (
     begin_round,
     empty_round,
@@ -22,7 +23,6 @@ from uav_task_alloc.solver.timed.ruin import (
     list_absent,
     ruin_strings,
 )
-from uav_task_alloc.solver.timed.segments import cost_of
 from uav_task_alloc.solver.timed.tails import exchange_tails
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState

@@ -11,7 +11,8 @@ import pytest
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.timed.evaluator import Held, evaluate_routes
+from uav_task_alloc.solver.timed.evaluator import evaluate_routes
+from uav_task_alloc.solver.timed.schedule import Held
 
 UAV = Uav('u', (0.0, 0.0, 0.0), cruise_speed=10.0)
 IN_AIR = replace(UAV, home=(0.0, 500.0, 0.0))

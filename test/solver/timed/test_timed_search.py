@@ -19,6 +19,7 @@ from uav_task_alloc.solver.timed.insertion import near_place, unlink
 from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
+from uav_task_alloc.solver.timed.route_sums import cost_of
 from uav_task_alloc.solver.timed.ruin import (
     REMOVED,
     begin_round,
@@ -28,7 +29,7 @@ from uav_task_alloc.solver.timed.ruin import (
     save_route,
     take_back,
 )
-from uav_task_alloc.solver.timed.segments import cost_of, update
+from uav_task_alloc.solver.timed.segments import update
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState
 from uav_task_alloc.study.small_problems import compare_small, small_problem

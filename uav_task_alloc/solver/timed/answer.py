@@ -12,15 +12,11 @@ import numpy as np
 from uav_task_alloc.model import Leg, Plan, Task
 from uav_task_alloc.objective import fit
 from uav_task_alloc.solver.answer import leg_between
-from uav_task_alloc.solver.timed.evaluator import (
-    Held,
-    TimedEvaluation,
-    evaluate_legs,
-    evaluate_routes,
-)
+from uav_task_alloc.solver.timed.evaluator import TimedEvaluation, evaluate_legs, evaluate_routes
 from uav_task_alloc.solver.timed.problem import TimedProblem
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
+from uav_task_alloc.solver.timed.schedule import Held
 from uav_task_alloc.solver.timed.search import Incumbent
 from uav_task_alloc.solver.timed.ways import TURN_BIT
 

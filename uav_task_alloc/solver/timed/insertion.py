@@ -11,8 +11,9 @@ from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import SIGNED
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
+from uav_task_alloc.solver.timed.legs import join, leg_of
 from uav_task_alloc.solver.timed.places import excess_price, place_cost
-from uav_task_alloc.solver.timed.segments import join, leg_of, update
+from uav_task_alloc.solver.timed.segments import update
 from uav_task_alloc.solver.timed.visits import (
     BASE_BEFORE,
     NO_VISIT,

@@ -7,7 +7,8 @@ import math
 from uav_task_alloc.kernel import inline_kernel, inner_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, Links, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.segments import join, update
+from uav_task_alloc.solver.timed.legs import join
+from uav_task_alloc.solver.timed.segments import update
 from uav_task_alloc.solver.timed.ways import TURN_BIT, face, has_paths, is_task, is_turned
 
 

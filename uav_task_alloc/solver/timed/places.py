@@ -7,7 +7,8 @@ import math
 from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.segments import after_leg, finish_cost, leg_of, slot_of
+from uav_task_alloc.solver.timed.legs import after_leg, leg_of, slot_of
+from uav_task_alloc.solver.timed.route_sums import finish_cost
 from uav_task_alloc.solver.timed.ways import TURNED, directions, face, has_paths, service_of
 
 

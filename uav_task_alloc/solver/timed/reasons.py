@@ -12,9 +12,9 @@ from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.reasons import lasting_reason, way_reason
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
+from uav_task_alloc.solver.timed.legs import leg_of
 from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
-from uav_task_alloc.solver.timed.segments import leg_of
 from uav_task_alloc.solver.timed.visits import BASE_BEFORE, free_visit, split_cost
 from uav_task_alloc.solver.timed.ways import directions, face, has_paths, service_of
 

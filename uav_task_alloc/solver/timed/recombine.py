@@ -19,7 +19,7 @@ from uav_task_alloc.solver.recombine import GROUP_SIZE, MAX_TRIES, PASSES, TRY_C
 from uav_task_alloc.solver.routes import TINY, Arrays, Ints
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.segments import is_infeasible
+from uav_task_alloc.solver.timed.route_sums import is_infeasible
 
 _NEAR_TASKS = 6  # neighbours of a task that make two routes adjacent
 

@@ -25,8 +25,10 @@ from uav_task_alloc.solver.timed.insertion import (
     place_anywhere,
     unlink,
 )
+from uav_task_alloc.solver.timed.legs import slot_of
 from uav_task_alloc.solver.timed.places import cheapest_direction
-from uav_task_alloc.solver.timed.segments import cost_of, set_reach, slot_of, update
+from uav_task_alloc.solver.timed.route_sums import cost_of
+from uav_task_alloc.solver.timed.segments import set_reach, update
 from uav_task_alloc.solver.timed.ways import has_paths, is_task
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one

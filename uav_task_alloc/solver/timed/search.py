@@ -21,6 +21,7 @@ from uav_task_alloc.solver.timed.arrays import (
     node_count,
 )
 from uav_task_alloc.solver.timed.order import route_order, true_cost
+from uav_task_alloc.solver.timed.route_sums import cost_of
 from uav_task_alloc.solver.timed.ruin import (
     ABSENT,
     PATIENCE,
@@ -32,7 +33,6 @@ from uav_task_alloc.solver.timed.ruin import (
     ruin_strings,
     take_back,
 )
-from uav_task_alloc.solver.timed.segments import cost_of
 from uav_task_alloc.solver.timed.ways import has_paths
 
 MAX_OPENING = 64  # absent tasks that a round tries to insert that opens a route

@@ -7,8 +7,8 @@ import math
 from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
+from uav_task_alloc.solver.timed.legs import after_leg, leg_of, slot_of
 from uav_task_alloc.solver.timed.places import cost_of_delay, cost_of_excess, fits_trip
-from uav_task_alloc.solver.timed.segments import after_leg, leg_of, slot_of
 from uav_task_alloc.solver.timed.ways import service_of
 
 NO_VISIT, BASE_BEFORE, BASE_AFTER = range(3)  # kinds of places: with a base visit or without
