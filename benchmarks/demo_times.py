@@ -19,7 +19,7 @@ from statistics import median
 from typing import Any
 
 from uav_task_alloc.record.ground_truth import read_run, visits
-from uav_task_alloc.record.run_state import RECORD_FILE, read_lines
+from uav_task_alloc.record.record_file import RECORD_FILE, read_lines
 from uav_task_alloc.scenario import load, to_yaml
 from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP, ScenarioWind
 

@@ -8,7 +8,7 @@ import pytest
 from uav_task_alloc.cli import report
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
-from uav_task_alloc.record.run_state import RECORD_FILE
+from uav_task_alloc.record.record_file import RECORD_FILE
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 HUT = ThreatZone.cylinder('hut', (50.0, 0.0), 5.0)

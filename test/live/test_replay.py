@@ -8,7 +8,7 @@ import pytest
 from small_run import BEGIN, FIRST, LATER
 
 from uav_task_alloc.live.__main__ import main, play
-from uav_task_alloc.record.run_state import RECORD_FILE
+from uav_task_alloc.record.record_file import RECORD_FILE
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from small_run import (
 )
 
 from uav_task_alloc.live.scene import Scene
-from uav_task_alloc.record.message_records import uploads_record
+from uav_task_alloc.record.diagnostic_records import uploads_record
 from uav_task_alloc.record.progress import fleet_lines
 from uav_task_alloc.record.run_state import RunState
 

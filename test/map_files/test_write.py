@@ -12,7 +12,8 @@ from uav_task_alloc.map_files.write import plan_shapes, write_map
 from uav_task_alloc.mavlink.mission.files import write_missions
 from uav_task_alloc.model import Leg, Plan
 from uav_task_alloc.record.ground_truth import TrueSample
-from uav_task_alloc.record.run_state import AnnouncedTask, RunState
+from uav_task_alloc.record.reported import AnnouncedTask
+from uav_task_alloc.record.run_state import RunState
 from uav_task_alloc.scenario.read import parse
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 

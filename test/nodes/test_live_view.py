@@ -22,7 +22,8 @@ from uav_task_alloc.nodes.conversions.messages import (
     from_zones,
 )
 from uav_task_alloc.nodes.ros.udp_ports import free_port
-from uav_task_alloc.record import message_records, run_state
+from uav_task_alloc.record import diagnostic_records, message_records, run_state
+from uav_task_alloc.record.reported import ReportedStatus
 from uav_task_alloc.zone_codec import decode_zone
 
 TEXT = """uavs:
@@ -75,7 +76,7 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     assert '1 of 1 tasks completed; 0 zones' in view.output()
     state_of_run = run_state.read_record(tmp_path / 'out')
     assert state_of_run.tasks['t1'].position == (10.0, 20.0, 30.0)
-    assert state_of_run.statuses['t1'] == run_state.ReportedStatus('COMPLETED', 'uav_1', '')
+    assert state_of_run.statuses['t1'] == ReportedStatus('COMPLETED', 'uav_1', '')
     assert [(solve.milliseconds, solve.trigger) for solve in state_of_run.solves] == [
         (pytest.approx(100.0), '1 new task')]
     assert state_of_run.uavs['uav_1']['mode'] == 'STANDBY'
@@ -178,7 +179,7 @@ def test_uploads_and_health_are_taken_from_the_diagnostics():
             ('uploads', '4'), ('rate', '10'), ('authority', 'LOST'), ('authority_why', 'why'),
             ('authority_for', '12 s'), ('given_back_by', '~/hand_over'),
             ('clock_rate', '7.980'))])
-    assert message_records.uploads_record(DiagnosticArray(status=[status])) == {
+    assert diagnostic_records.uploads_record(DiagnosticArray(status=[status])) == {
         'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4},
         'health': {'uav_1': [1, 'link stale']}, 'clock_rates': {'uav_1': 7.98}, 'uav_warnings': {},
         'orders': {}, 'battery_reserves': {}, 'waiting': {},
@@ -192,7 +193,7 @@ def test_the_duration_of_authority_is_a_number_or_unknown(given, seconds):
     status = DiagnosticStatus(hardware_id='u', values=[
         KeyValue(key='authority', value='HELD'), KeyValue(key='authority_for', value=given),
         KeyValue(key='given_back_by', value='nothing is needed')])
-    line = message_records.uploads_record(DiagnosticArray(status=[status]))
+    line = diagnostic_records.uploads_record(DiagnosticArray(status=[status]))
     authority = line['authority']['u']
     assert (authority['for'], authority['back']) == (seconds, '')
 
@@ -200,7 +201,7 @@ def test_the_duration_of_authority_is_a_number_or_unknown(given, seconds):
 @pytest.mark.parametrize('given', ['unknown', 'nan', 'inf', '0.0', '-1.0', ''])
 def test_a_clock_rate_is_a_positive_number_or_unknown(given):
     status = DiagnosticStatus(hardware_id='u', values=[KeyValue(key='clock_rate', value=given)])
-    assert message_records.uploads_record(DiagnosticArray(status=[status]))['clock_rates'] == {}
+    assert diagnostic_records.uploads_record(DiagnosticArray(status=[status]))['clock_rates'] == {}
 
 
 def test_a_state_record_has_the_authority():
@@ -211,7 +212,7 @@ def test_a_state_record_has_the_authority():
 @pytest.mark.parametrize('value', ['\u00b2', '\u0663', '-1', '', '9' * 5000, '1e3'])
 def test_finding_31_a_count_of_uploads_is_plain_digits(value):
     status = DiagnosticStatus(name='b', values=[KeyValue(key='uploads', value=value)])
-    assert message_records.uploads_record(DiagnosticArray(status=[status]))['uploads'] == {}
+    assert diagnostic_records.uploads_record(DiagnosticArray(status=[status]))['uploads'] == {}
 
 
 def test_finding_31_via_points_that_are_not_finite_are_left_out():

@@ -14,7 +14,7 @@ from uav_task_alloc.model.route_stops import route_points, route_stops
 from uav_task_alloc.plots import labels, plan as plan_map, space, style, times
 from uav_task_alloc.plots.flat import MapFigure
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
-from uav_task_alloc.record.run_state import RECORD_FILE
+from uav_task_alloc.record.record_file import RECORD_FILE
 from uav_task_alloc.separation.rule import Conflict
 from uav_task_alloc.timetable import Timetable
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone

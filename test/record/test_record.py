@@ -9,7 +9,9 @@ from uav_task_alloc import scenario
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record.ground_truth import GroundTruth, visits, zone_entries
 from uav_task_alloc.record.progress import fleet_lines, headline, run_is_over
-from uav_task_alloc.record.run_state import RECORD_FILE, RunState, ZoneInterval, read_record
+from uav_task_alloc.record.record_file import RECORD_FILE
+from uav_task_alloc.record.reported import ZoneInterval
+from uav_task_alloc.record.run_state import RunState, read_record
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 DOME = ThreatZone.hemisphere('dome', (100.0, 0.0, 0.0), 20.0, margin=10.0)

@@ -14,7 +14,7 @@ from uav_task_alloc.allocator.state.zone_checks import blocked_text
 from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.piece_ids import split_piece
-from uav_task_alloc.record.message_records import BATTERY_RESERVE, ORDER, UAV_WARNING, WAITING
+from uav_task_alloc.record.diagnostic_records import BATTERY_RESERVE, ORDER, UAV_WARNING, WAITING
 
 _MAX_NAMED = 20  # UAVs in a warning
 _MAX_ORDERS = 50  # in the diagnostics, the newest

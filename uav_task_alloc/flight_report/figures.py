@@ -18,7 +18,7 @@ from uav_task_alloc.geometry.zones import outline
 from uav_task_alloc.model import Point, Shape, ThreatZone
 from uav_task_alloc.palette import DARK_RED, RED, STATE_COLOURS, rgb, uav_colour
 from uav_task_alloc.piece_ids import split_piece
-from uav_task_alloc.record.run_state import END_STATES
+from uav_task_alloc.record.reported import END_STATES
 
 _PLANNED = '#222222'
 _ZONE_FILL = 'rgba({:.0f},{:.0f},{:.0f},0.18)'.format(*(255.0 * v for v in rgb(RED)))

@@ -17,7 +17,9 @@ from uav_task_alloc.record.plan_diff import (
     route_lists,
     trigger_text,
 )
-from uav_task_alloc.record.run_state import END_STATES, Line, ReportedStatus, RunState
+from uav_task_alloc.record.record_file import Line
+from uav_task_alloc.record.reported import END_STATES, ReportedStatus
+from uav_task_alloc.record.run_state import RunState
 
 _SAMPLE_PERIOD = 0.2  # [s] between the samples of a track, of height and battery
 MAX_EVENTS = 5000  # later ones are dropped

@@ -10,7 +10,8 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import UPDATE_PERIOD, SnapshotStore
 from uav_task_alloc.live.tiles import TileSource, tile_source
-from uav_task_alloc.record.run_state import RECORD_FILE, RunState, read_lines
+from uav_task_alloc.record.record_file import RECORD_FILE, read_lines
+from uav_task_alloc.record.run_state import RunState
 
 
 def play(out_dir: Path, until: float = math.inf) -> SnapshotStore:

@@ -14,7 +14,9 @@ from uav_task_alloc.record.plan_diff import (
     route_lists,
     trigger_text,
 )
-from uav_task_alloc.record.run_state import Line, RunState, Service
+from uav_task_alloc.record.record_file import Line
+from uav_task_alloc.record.reported import Service
+from uav_task_alloc.record.run_state import RunState
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 _MOST_TIMES = 1000  # tasks flown that the page draws, the latest

@@ -35,10 +35,11 @@ from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run, with_flags
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import LiveViewParams
-from uav_task_alloc.record import message_records
+from uav_task_alloc.record import diagnostic_records, message_records
 from uav_task_alloc.record.message_records import RecordBody
 from uav_task_alloc.record.progress import fleet_lines, headline, run_is_over
-from uav_task_alloc.record.run_state import RECORD_FILE, RunState
+from uav_task_alloc.record.record_file import RECORD_FILE
+from uav_task_alloc.record.run_state import RunState
 
 if TYPE_CHECKING:
     from uav_task_alloc.live.server import PageServer
@@ -141,7 +142,7 @@ class LiveView(Node):
         self._subscribe(m.PlanProposal, 'plan_proposal', LATCHED, message_records.proposal_record)
         self._subscribe(m.SeparationAlert, 'separation_alerts', EVENTS,
                         message_records.separation_record)
-        self._subscribe(DiagnosticArray, '/diagnostics', 10, message_records.uploads_record)
+        self._subscribe(DiagnosticArray, '/diagnostics', 10, diagnostic_records.uploads_record)
         self.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
         for uav in self.played.uavs if self.played else ():
             self.subscribe_list(uav.id)

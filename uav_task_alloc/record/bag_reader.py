@@ -17,9 +17,9 @@ from zstandard import ZstdError
 from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.record import message_records
+from uav_task_alloc.record import diagnostic_records, message_records
 from uav_task_alloc.record.bag import METADATA_NAME
-from uav_task_alloc.record.run_state import Line
+from uav_task_alloc.record.record_file import Line
 
 _PACKAGE = 'uav_task_alloc_msgs/msg/'
 _MAX_RECORD_SIZE = 2**30  # [bytes]; a larger size is damage
@@ -32,7 +32,7 @@ _BUILDERS: dict[str, Callable[[Any], message_records.RecordBody]] = {
     _PACKAGE + 'UavState': message_records.state_record,
     _PACKAGE + 'SeparationAlert': message_records.separation_record,
     _PACKAGE + 'FleetOrigin': message_records.origin_record,
-    'diagnostic_msgs/msg/DiagnosticArray': message_records.uploads_record}
+    'diagnostic_msgs/msg/DiagnosticArray': diagnostic_records.uploads_record}
 _ANNOUNCEMENT = _PACKAGE + 'TaskAnnouncement'
 
 

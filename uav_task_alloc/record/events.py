@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 
 from uav_task_alloc.errors import first_of
-from uav_task_alloc.record.run_state import Line, RunState
+from uav_task_alloc.record.record_file import Line
+from uav_task_alloc.record.run_state import RunState
 
 _MAX_NAMED = 3  # ids in one sentence
 Sentence = tuple[str, str]  # (kind: task, good, fault, zone, uav or plan; sentence)

@@ -10,7 +10,9 @@ from pathlib import Path
 
 from uav_task_alloc.geometry.polyline import point_at, polyline_length
 from uav_task_alloc.model import Point
-from uav_task_alloc.record.run_state import Line, RunState, ZoneInterval, read_lines, read_record
+from uav_task_alloc.record.record_file import Line, read_lines
+from uav_task_alloc.record.reported import ZoneInterval
+from uav_task_alloc.record.run_state import RunState, read_record
 
 TRUTH_FILE = 'flight.jsonl'
 _VISIT_RADIUS = 1.5  # [m] between a task and the mission item of its visit

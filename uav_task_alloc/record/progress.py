@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.record.run_state import FINAL_STATES, Line, RunState
+from uav_task_alloc.record.record_file import Line
+from uav_task_alloc.record.reported import FINAL_STATES
+from uav_task_alloc.record.run_state import RunState
 from uav_task_alloc.scenario import Scenario
 
 _AT_REST = 0.5  # [m/s]

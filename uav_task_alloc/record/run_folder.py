@@ -9,7 +9,7 @@ from pathlib import Path
 from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.params import NODES
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
-from uav_task_alloc.record.run_state import RECORD_FILE
+from uav_task_alloc.record.record_file import RECORD_FILE
 
 MARKER = '.uav_task_alloc_demo'  # marks a folder that a demo created or found empty
 STATE = 'state'  # folder of allocator and bridge

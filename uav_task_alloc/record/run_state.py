@@ -2,13 +2,10 @@
 """The state of a run as its nodes report it, from the lines of record.jsonl or live messages."""
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.geometry.polyline import polyline_length
@@ -16,81 +13,22 @@ from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lists
+from uav_task_alloc.record.record_file import RECORD_FILE, Line, read_lines
+from uav_task_alloc.record.reported import (
+    AnnouncedTask,
+    ReportedAuthority,
+    ReportedStatus,
+    Service,
+    SolveRecord,
+    ZoneInterval,
+)
 from uav_task_alloc.zone_codec import decode_zone
 
-RECORD_FILE = 'record.jsonl'
-END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
-FINAL_STATES = (*END_STATES, 'UNASSIGNED')
 # share by which a measured clock rate varies, and that of a real vehicle over a bad link
 _RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
 _MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
-# `wall`: time of the record, that of /clock where its node lives by simulated time
-Line = Mapping[str, Any]  # `wall` [unix s], `kind`, and the values that RunState.on_KIND reads
-
-
-@dataclass(frozen=True, slots=True)
-class AnnouncedTask:
-    """A task as it was announced."""
-
-    position: Point  # [m]
-    wall: float  # [unix s]
-    service: float = 0.0  # [s]
-    earliest: float | None = None  # [ROS s] of the start of its service; None: any
-    latest: float | None = None  # [ROS s] of the start of its service; None: any
-    work: str = ''  # name of a kind of Task messages; '' for a point
-    path: tuple[Point, ...] = ()  # [m] of a LINE, or the outline of an AREA
-    holes: tuple[tuple[Point, ...], ...] = ()  # [m]
-    radius: float = 0.0  # [m] of an ORBIT
-
-
-@dataclass(frozen=True, slots=True)
-class Service:
-    """The service of a task, as planned when the leg to it began, or as flown."""
-
-    uav: str  # id
-    begin: float  # [unix s] as `wall`
-    end: float  # [unix s] as `wall`
-
-
-@dataclass(frozen=True, slots=True)
-class ReportedStatus:
-    """The state of a task as the allocator reports it."""
-
-    state: str  # name of a TaskStatus constant
-    uav: str  # that has it, or had it; '': none
-    reason: str  # of the state, for users
-    done: int = 0  # pieces of work that are completed
-    pieces: int = 0  # of work; 0: it has none
-
-
-@dataclass(frozen=True, slots=True)
-class SolveRecord:
-    """One published plan: when, solve time, and what triggered it."""
-
-    wall: float  # [unix s]
-    milliseconds: float
-    trigger: str
-
-
-@dataclass(frozen=True, slots=True)
-class ZoneInterval:
-    """A zone and the time during which it was in force."""
-
-    zone: ThreatZone
-    since: float  # [unix s]
-    until: float = math.inf  # [unix s]
-
-
-@dataclass(frozen=True, slots=True)
-class ReportedAuthority:
-    """Who may command a UAV, as its bridge reports it."""
-
-    state: str
-    reason: str
-    since: float | None  # [unix s]
-    given_back_by: str  # what returns the UAV to the bridge; '': nothing is needed
 
 
 @dataclass
@@ -379,21 +317,3 @@ def read_record(out_dir: Path) -> RunState:
     for line in read_lines(out_dir / RECORD_FILE):
         state.apply(line)
     return state
-
-
-def read_lines(path: Path) -> Iterable[Line]:
-    """Read the objects of a file of JSON lines; an unfinished last line is ignored.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        One object a line, read as they are iterated.
-
-    Raises:
-        OSError: while iterating; the file cannot be read.
-    """
-    with path.open(encoding='utf-8') as file:
-        for text in file:
-            if text.endswith('\n'):
-                yield json.loads(text)

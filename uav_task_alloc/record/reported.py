@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What nodes report of a run, as values: tasks, their states, services, zones, authority."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from uav_task_alloc.model import Point, ThreatZone
+
+END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
+FINAL_STATES = (*END_STATES, 'UNASSIGNED')
+
+
+@dataclass(frozen=True, slots=True)
+class AnnouncedTask:
+    """A task as it was announced."""
+
+    position: Point  # [m]
+    wall: float  # [unix s]
+    service: float = 0.0  # [s]
+    earliest: float | None = None  # [ROS s] of the start of its service; None: any
+    latest: float | None = None  # [ROS s] of the start of its service; None: any
+    work: str = ''  # name of a kind of Task messages; '' for a point
+    path: tuple[Point, ...] = ()  # [m] of a LINE, or the outline of an AREA
+    holes: tuple[tuple[Point, ...], ...] = ()  # [m]
+    radius: float = 0.0  # [m] of an ORBIT
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """The service of a task, as planned when the leg to it began, or as flown."""
+
+    uav: str  # id
+    begin: float  # [unix s] as `wall`
+    end: float  # [unix s] as `wall`
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedStatus:
+    """The state of a task as the allocator reports it."""
+
+    state: str  # name of a TaskStatus constant
+    uav: str  # that has it, or had it; '': none
+    reason: str  # of the state, for users
+    done: int = 0  # pieces of work that are completed
+    pieces: int = 0  # of work; 0: it has none
+
+
+@dataclass(frozen=True, slots=True)
+class SolveRecord:
+    """One published plan: when, solve time, and what triggered it."""
+
+    wall: float  # [unix s]
+    milliseconds: float
+    trigger: str
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneInterval:
+    """A zone and the time during which it was in force."""
+
+    zone: ThreatZone
+    since: float  # [unix s]
+    until: float = math.inf  # [unix s]
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedAuthority:
+    """Who may command a UAV, as its bridge reports it."""
+
+    state: str
+    reason: str
+    since: float | None  # [unix s]
+    given_back_by: str  # what returns the UAV to the bridge; '': nothing is needed
