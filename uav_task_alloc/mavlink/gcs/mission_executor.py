@@ -10,8 +10,6 @@ import random
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from pymavlink.dialects.v20 import ardupilotmega as d
-
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.authority import (
@@ -29,6 +27,8 @@ from uav_task_alloc.mavlink.gcs.flown_items import MAX_AGE
 from uav_task_alloc.mavlink.gcs.list_execution import ListExecution
 from uav_task_alloc.mavlink.gcs.message_rates import MessageRates
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
+from uav_task_alloc.mavlink.gcs.mission_messages import MissionMessages
+from uav_task_alloc.mavlink.gcs.mission_transfers import MissionTransfers
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRule
 from uav_task_alloc.mavlink.gcs.policy import Policy
@@ -41,11 +41,9 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.vehicle_energy import VehicleEnergy
 from uav_task_alloc.mavlink.gcs.vehicle_fence import FenceMemory, VehicleFence
 from uav_task_alloc.mavlink.mission.first_leg import LegStart
-from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
-from uav_task_alloc.mavlink.mission.upload import UploadState
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
@@ -90,7 +88,9 @@ class MissionExecutor:
         self._rates = MessageRates(peer, self.telemetry, now)
         self._end_actions = EndActions(peer, profile, self.onboard)
         self._was_stale, self._restarts = False, 0
-        self._event_retry, self._status_text_log = EventRetry(), StatusTextLog()
+        self._event_retry, log = EventRetry(), StatusTextLog()
+        self._messages = MissionMessages(self.onboard, self.telemetry, self.watch, self.sender,
+                                         profile.atomic, log, self.notes)
         self.fence = VehicleFence(peer, profile, origin, self.telemetry, self.onboard,
                                  self.authority, lambda: self.policy, rng,
                                  fence_memory or FenceMemory())
@@ -100,7 +100,7 @@ class MissionExecutor:
         self._end_of_list = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
                                       lambda: self.policy, self.notes, profile)
         execution = ListExecution(self.sender, self.telemetry, self.onboard, self.watch, profile,
-                                  self._end_of_list, self._status_text_log)
+                                  self._end_of_list, log)
         self.holds = HoldRule(self.sender, self.telemetry, self.watch, profile, self.onboard,
                               execution.update_mission, self.notes)
         restore_record(record, self.onboard, self.watch, profile)
@@ -109,14 +109,16 @@ class MissionExecutor:
                       wanted.failed)
         self._notes_of_parts = (self.watch.notes, self.onboard.notes, wanted.notes,
                                 self.sender.notes, self.fence.notes)
-        self._rules = self._in_order(takeoff, execution)
+        transfers = MissionTransfers(self.sender, self.telemetry, self.onboard, self.authority,
+                                     self._end_of_list)
+        self._rules = self._in_order(takeoff, execution, transfers)
 
     def _in_order(self, takeoff: Takeoff, execution: ListExecution,
-                  ) -> tuple[Callable[[float], NextMessages], ...]:
+                  transfers: MissionTransfers) -> tuple[Callable[[float], NextMessages], ...]:
         """The rules: the first that is not satisfied returns its messages."""
         return (
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
-            self.holds.hold, self._upload, self._read, self._has_list, self._resume,
+            self.holds.hold, transfers.upload, transfers.read, self._has_list, transfers.resume,
             self._may_act, self._hold_first, self._end_of_list.held_too_long, self.holds.stay,
             self._end_of_list.empty, self.fence.clear_way, execution.update_mission,
             takeoff.take_off, execution.fly)
@@ -206,7 +208,7 @@ class MissionExecutor:
         self._end_actions.receive(message)
         if message.get_type() == 'COMMAND_ACK' and self._peer.is_from_vehicle(message):
             self.watch.receive_command_ack(message, self.telemetry.frame)
-        self._update_progress(message, newest, now)
+        self._messages.receive(message, newest, now)
         return self._gate(out + self._act(now), now)
 
     def step(self, now: float) -> list[Message]:
@@ -240,45 +242,6 @@ class MissionExecutor:
             for notes in self._notes_of_parts:
                 self.notes += notes
                 notes.clear()
-
-    def _update_progress(self, message: Message, newest: bool, now: float) -> None:
-        kind, progress, own = message.get_type(), self.onboard.progress, self.onboard.own
-        flying = self.telemetry.in_mission
-        if kind == 'GLOBAL_POSITION_INT':
-            self._position(message, newest, now)
-        elif kind == 'MISSION_ITEM_REACHED':
-            self.onboard.reached(message.seq - own, now, self.telemetry.frame)
-        elif kind == 'MISSION_CURRENT' and newest and (
-                self.onboard.is_of_known_mission(message, now, flying)):
-            seq = max(0, message.seq - own)
-            self.onboard.resume.note_current(seq, now, self.telemetry.frame)
-            if self.onboard.set_current_to is None:  # else seq is of the previous mission
-                progress.note_current(seq, now, flying, self.telemetry.frame,
-                                      self.telemetry.mission_restarted,
-                                      self.telemetry.showed_mission)
-            elif flying:
-                self.onboard.note_flown_unset(seq, now)
-            ended = self.telemetry.mission_ended and self.onboard.set_current_to is None
-            may_have_ended = flying or ended if not self.profile.atomic else (  # PX4: take-off too
-                self.telemetry.airborne_since_mission and progress.may_have_ended_unseen(seq))
-            if may_have_ended and message.mission_state == d.MISSION_STATE_COMPLETE:
-                progress.note_mission_complete(seq, now, self.telemetry.frame)
-            if not self.sender.busy and not self.onboard.open:
-                self.onboard.watch(message, now)
-        elif kind == 'STATUSTEXT':
-            self.watch.receive_status_text(message, now)
-            self.sender.note_arming_refusal(str(message.text))
-            self.onboard.list.horizon.note(str(message.text))
-            self.notes += filter(None, (self._status_text_log.receive(message, now),))
-
-    def _position(self, message: Message, newest: bool, now: float) -> None:
-        if self.telemetry.has_position:
-            position, velocity = self.telemetry.enu_of(message)
-            self.onboard.progress.add_position(
-                PositionSample(message.time_boot_ms * 1e-3, position, velocity), newest, now,
-                self.telemetry.frame)
-            if self.telemetry.grounded:  # its estimate settles
-                self.onboard.progress.positions.end_doubt()
 
     def _leg_start(self) -> LegStart | None:
         """Its position, at the height after a take-off if one is due; None: unknown."""
@@ -322,50 +285,9 @@ class MissionExecutor:
             self.onboard.abort()
         return None
 
-    def _upload(self, now: float) -> NextMessages:
-        """Continue an upload; set the current item past tasks flown in the meantime."""
-        onboard = self.onboard
-        if onboard.transfer_failed:
-            onboard.transfer_failed = False
-            self.sender.fail(now)
-        if not onboard.upload.busy:
-            return None
-        seq = onboard.next_item()
-        if seq is not None and self.authority.held:
-            onboard.progress.begin_set_current(seq)
-            return self.sender.set_current(
-                seq + onboard.own, now, lambda t: onboard.note_set(seq, t))
-        self.sender.waits_for = 'its upload'
-        if (onboard.upload.state in (UploadState.BACKOFF, UploadState.DRAINING)
-                and onboard.outdated and onboard.held is not None and onboard.wanted()
-                and not onboard.upload.may_be_stored):
-            return onboard.begin_upload(onboard.diff(), now)
-        return self._end_of_list.held_too_long(now) or []
-
-    def _read(self, now: float) -> NextMessages:
-        """Read the onboard mission where it is unknown."""
-        if self.onboard.held is not None:
-            return None
-        if not self.telemetry.past_boot:
-            return self.sender.wait_for('the autopilot to start')
-        if self.sender.backing_off(now):
-            return self._end_of_list.held_too_long(now) or []
-        self.sender.waits_for = 'a readback'
-        return self.onboard.upload.read(now)
-
     def _has_list(self, now: float) -> NextMessages:
         self.sender.waits_for = 'a list' if self.onboard.tasks is None else ''
         return [] if self.onboard.tasks is None else None
-
-    def _resume(self, now: float) -> NextMessages:
-        """After a restart of the bridge, complete the tasks flown in the meantime."""
-        onboard = self.onboard
-        assert onboard.tasks is not None
-        if onboard.resume.awaits_position(onboard.held or (), onboard.mission.verified_at, now):
-            return []  # its current item is not known yet
-        onboard.resume.locate(onboard.held or (), onboard.tasks, now)
-        onboard.complete_flown(now)
-        return None
 
     def _may_act(self, now: float) -> NextMessages:
         if self.authority.state is AuthorityState.LOST:

@@ -6,11 +6,12 @@ import random
 from collections import deque
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
+from uav_task_alloc.mavlink.autopilots import Profile
+from uav_task_alloc.mavlink.gcs.mission_changes import MissionChanges
 from uav_task_alloc.mavlink.gcs.resume import Resume
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_failures import UploadFailures
-from uav_task_alloc.mavlink.mission.diff import DiffKind, LatestDiff, MissionDiff, diff_missions
+from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
 from uav_task_alloc.mavlink.mission.flown_meanwhile import (
     first_task,
     next_after_unset,
@@ -60,7 +61,8 @@ class OnboardMission:
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._at_start: object = None  # of the upload: tasks done, detour points left out
         self._reports = ReportsDuringUpload(self.progress, origin, profile.atomic)
-        self.mission, self._latest_diff = VerifiedMission(self.own, profile.atomic), LatestDiff()
+        self.mission = VerifiedMission(self.own, profile.atomic)
+        self._changes = MissionChanges(self.list, self.progress, telemetry, profile)
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
         self.taken = False  # the vehicle has taken all items of the latest transfer
@@ -117,24 +119,7 @@ class OnboardMission:
     def diff(self) -> MissionDiff:
         """What to change on board so that the list is flown; requires a known mission."""
         assert self.held is not None
-        wanted, current, telemetry = self.wanted(), self.progress.current, self._telemetry
-        held = telemetry.mode is ModeFunction.HOLD and telemetry.airborne
-        if held and telemetry.has_position and self.progress.coverage.must_begin(
-                self.progress.active, telemetry.position):
-            current = None  # it would fly on along a way from where it was held
-        diff = self._latest_diff.of(self.held, current, wanted, self._done())
-        if self.list.horizon.stops is not None and diff.kind is not DiffKind.KEEP:
-            if self.list.has_enough(self.held):
-                return MissionDiff(DiffKind.KEEP, self.held, current or 0)
-            if self.list.horizon.grow():
-                return self.diff()
-        if 0 < diff.start == len(diff.items) - 1 and self._profile.atomic and (
-                telemetry.disarmed_since_mission):
-            return MissionDiff(DiffKind.REPLACE, wanted, 0)  # PX4 would begin at its first item
-        room = self._profile.rules.capacity - self.own
-        if diff.kind is DiffKind.APPEND and (self._profile.atomic or len(diff.items) > room):
-            return diff_missions(self.held, current, wanted, append=False)
-        return diff
+        return self._changes.needed(self.held)
 
     def adopt(self, diff: MissionDiff, now: float, tasks: TaskList | None = None) -> None:
         """Mark the list as verified, as the onboard mission already flies it.
@@ -157,13 +142,10 @@ class OnboardMission:
         self._uploading, self.taken, self.transfer_failed = (diff, self.tasks), False, False
         self.upload_started_at, self._reports.sent_since = now, None
         self.list.horizon.begin()
-        self._at_start = self._done(), self.list.left_out
+        self._at_start = self.progress.done, self.list.left_out
         home = (home_item(self._telemetry.home, self._origin, self._profile.rules),) * self.own
         return self.upload.replace(Mission(
             home + diff.items, diff.start + self.own, self._profile.atomic, self.own), now)
-
-    def _done(self) -> frozenset[str]:
-        return self.progress.pending.union(self.progress.completed)
 
     def next_item(self) -> int | None:
         """Seq to set during a transfer: past what PX4 has flown meanwhile; None: it flies on."""
@@ -180,7 +162,7 @@ class OnboardMission:
     def _overtaken(self) -> bool:
         """Whether, before another attempt, the upload is partly flown or of an older list."""
         return self._reports.has_reached or self.outdated or self._at_start != (
-            self._done(), self.list.left_out)
+            self.progress.done, self.list.left_out)
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of the mission protocol; returns the messages to send."""
@@ -373,7 +355,8 @@ class OnboardMission:
                 return
             self._reports.credit(diff)
         if not self.mission.note_readback(
-                held, known, self.tasks is not None, lambda: self._can_continue(held), now):
+                held, known, self.tasks is not None,
+                lambda: self._changes.can_continue(held), now):
             self._reports.confirm()
             return
         self.resume.flown.keep()
@@ -382,12 +365,6 @@ class OnboardMission:
         (items, since), seq = self.resume.read_again(held, self.tasks), self._telemetry.current
         self.progress.begin(items, None if seq is None or not held else max(0, seq - self.own),
                             now, read=True, since=since)
-
-    def _can_continue(self, held: tuple[Item, ...]) -> bool:
-        """Whether the list can be flown with a mission without replacing it."""
-        wanted = self.wanted()
-        return bool(wanted) and diff_missions(
-            held, None, wanted, done=self.progress.completed).kind is not DiffKind.REPLACE
 
     def _on_failure(self, event: Failed, diff: MissionDiff, tasks: TaskList, now: float) -> None:
         self.mission.interrupt()

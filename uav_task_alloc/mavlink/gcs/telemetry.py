@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.autopilots import OFF_GROUND, ModeFunction, Profile
+from uav_task_alloc.mavlink.gcs.battery_level import BatteryLevel
 from uav_task_alloc.mavlink.gcs.boot_clock import BootClock
 from uav_task_alloc.mavlink.gcs.status_texts import failing_checks
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
@@ -21,8 +22,6 @@ _IN_MISSION = 1  # MISSION_CURRENT.mission_mode; 0: not known
 _NOT_FLOWN = {d.MISSION_STATE_NOT_STARTED, d.MISSION_STATE_PAUSED}  # ArduPilot sends the first
 _ORDERED = 5.0  # [s] in which the numbers of two frames order them
 _REPORTED = 3.0  # [s] until a vehicle without estimator or GPS reports is trusted
-_BATTERY_TIMEOUT = 10.0  # [s] without a report: the battery does not count
-_BATTERY_RISE = 0.03  # [0..1] smallest accepted rise of a battery reading
 _IN_AIR = frozenset({
     d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING})
 _SIMULATED = 2.0  # seconds of its clock in one of this program: a simulator that runs faster
@@ -71,7 +70,7 @@ class Telemetry:
         self._converted: tuple[Message, Point] | None = None  # the latest, and its position [m]
         self.height = math.nan  # [m] above home
         self.altitude = math.nan  # [m] AMSL
-        self.battery = math.nan  # 0..1, of the battery with least remaining
+        self._level = BatteryLevel()
         # a PX4 in mission mode flies nothing until it is armed, as after a return
         self.armed = self.arms_into_mission = self.disarmed_since_mission = False
         self.mode, self.mode_at = ModeFunction.UNKNOWN, -math.inf  # it was set then [s]
@@ -98,14 +97,13 @@ class Telemetry:
         # of its position; it has finished booting; was on the ground since it was in mission mode
         self._fix = self._estimates = self._started = self._landed_since_mission = False
         self.has_position = False  # valid by its estimator or its GPS
-        self._batteries: dict[int, tuple[float, float]] = {}  # remaining 0..1 and time [s] by id
         self._handlers = self._message_handlers()
 
     def _message_handlers(self) -> dict[str, Callable[[Message, float], None]]:
         """The methods that process a message, by its type."""
         return {
             'HEARTBEAT': self._heartbeat, 'GLOBAL_POSITION_INT': self._global_position,
-            'HOME_POSITION': self._home, 'BATTERY_STATUS': self._battery,
+            'HOME_POSITION': self._home, 'BATTERY_STATUS': self._level.take_battery,
             'SYS_STATUS': self._sys_status, 'EXTENDED_SYS_STATE': self._extended,
             'MISSION_CURRENT': self._current, 'MISSION_ITEM_REACHED': self._reached,
             'GPS_RAW_INT': self._gps, 'EKF_STATUS_REPORT': self._estimate,
@@ -115,6 +113,11 @@ class Telemetry:
     def boot_ms(self) -> int:
         """The latest time since boot of the vehicle [ms]."""
         return self._boot_clock.boot_ms
+
+    @property
+    def battery(self) -> float:
+        """[0..1] of the battery with least remaining; NaN: unknown."""
+        return self._level.remaining
 
     @property
     def off_ground(self) -> bool:
@@ -265,7 +268,7 @@ class Telemetry:
         self._first_at, self._started = None, False
         self._newest.clear()
         self.frames.clear()
-        self._batteries.clear()
+        self._level.restart()
 
     def _is_newest(self, message: Message, now: float) -> bool:
         """By the number of its frame: links may deliver out of order.
@@ -345,24 +348,9 @@ class Telemetry:
         self.home = to_enu(self._origin, message.latitude * 1e-7, message.longitude * 1e-7,
                            message.altitude * 1e-3)
 
-    def _battery(self, message: Message, now: float) -> None:
-        if message.battery_remaining >= 0:
-            self._batteries[message.id] = message.battery_remaining / 100.0, now
-            self._least_battery(now)
-
-    def _least_battery(self, now: float) -> None:
-        """Use the battery with least remaining; a rise below _BATTERY_RISE is noise."""
-        least = min(value for value, at in self._batteries.values()
-                    if now - at < _BATTERY_TIMEOUT)
-        before = self.battery
-        if math.isnan(before) or least < before or least > before + _BATTERY_RISE:
-            self.battery = least
-
     def _sys_status(self, message: Message, now: float) -> None:
         self.unhealthy = failing_checks(message)
-        if message.battery_remaining >= 0 and not any(
-                now - at < _BATTERY_TIMEOUT for _, at in self._batteries.values()):
-            self.battery = message.battery_remaining / 100.0
+        self._level.take_system(message, now)
 
     def _extended(self, message: Message, now: float) -> None:
         self._landed(message.landed_state)

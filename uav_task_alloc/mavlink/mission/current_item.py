@@ -15,15 +15,13 @@ from uav_task_alloc.actions import SETTLE
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
 from uav_task_alloc.mavlink.mission.epoch import Epoch
-from uav_task_alloc.mavlink.mission.flown_path import GAP
 from uav_task_alloc.mavlink.mission.item import Item, leg_count
+from uav_task_alloc.mavlink.mission.mission_mode import MissionMode
 from uav_task_alloc.mavlink.mission.passed_items import NO_TASKS, Claim, PassedItems, flown_nearby
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import ReachedEpoch
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 
-_AT_ONCE = 1.0  # [s] after mission mode was left in which a report shows what it did until then
-_NEXT = 0.3  # [s] until the next position, which may still be of mission mode
 _SILENT = 3.0  # [s] without a frame after which a vehicle may be lost
 
 
@@ -44,23 +42,14 @@ class CurrentItem:
                  epochs: ReachedEpoch, frames: FrameLog) -> None:
         self._epoch, self._tasks, self._positions = epoch, tasks, positions
         self._epochs, self._frames = epochs, frames
+        self.mode = MissionMode(positions, frames)
         self.passed = PassedItems(frames, positions)
         self.reports = CurrentItemReports()
         self.skipped: deque[str] = deque()  # tasks skipped by another station
         self.passed_over: deque[Item] = deque()  # passed, and not known to be flown
         self.set_by_other: int | None = None  # the current item, where another station set it
-        self.in_mission = False  # mission mode, by the newest heartbeat
-        self._entered_at = -math.inf  # vehicle time [s] at which it was in mission mode first
-        self._in_mission_at = -math.inf  # vehicle time [s] at which it was in mission mode last
-        self._shown_until = -math.inf  # vehicle time [s] until which a frame has shown that
-        self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
-        self._left_seen = -math.inf  # vehicle time [s] at which a message has shown that
-        self._left_frame = 0  # number of the newest frame when that was shown
-        self._flew_until: int | None = None  # number of the latest frame sent before, with an item
         # vehicle time [s] at which the current item was reported in another mode last
         self._unflown_until = -math.inf
-        # vehicle times [s] between which it left mission mode while no position came
-        self._left_unseen = math.inf, -math.inf
         # item and when [s] a report of another mode set it back, as that of a restart does
         self.set_back_from: tuple[int, float] | None = None
         self._after_skipped: int | None = None  # the item after those that were skipped
@@ -81,16 +70,16 @@ class CurrentItem:
         """
         for item in self.passed.seen():
             self._tasks.complete(item.task, item.place)
-        active, since = self._active_at_end(now), max(self._epoch.since, self._entered_at)
+        active, since = self._active_at_end(now), max(self._epoch.since, self.mode.entered_at)
         # after the last frame that shows mission mode a pilot may have taken it
         if active is not None and self._positions.was_at(
-                active, since, min(self._shown_until, until), close=0.0):
+                active, since, min(self.mode.shown_until, until), close=0.0):
             self._tasks.credit(active)
         self.reports.clear()
         self.passed.clear()
         self.set_by_other = None
-        self._left_unseen = math.inf, -math.inf
-        self._shown_until = self._unflown_until = -math.inf
+        self.mode.forget()
+        self._unflown_until = -math.inf
 
     def _active_at_end(self, now: float) -> Item | None:
         """The item that was flown until the last position before a restart; None: not known.
@@ -98,7 +87,7 @@ class CurrentItem:
         The mode and the current item of a restarted vehicle may come before its clock shows it.
         """
         epoch, back = self._epoch, self.set_back_from
-        if not self.in_mission and self._positions.path.newest > self._left_seen:
+        if not self.mode.in_mission and self._positions.path.newest > self.mode.left_seen:
             return None
         if back is not None and now - back[1] < MAX_MESSAGE_DELAY and back[0] < len(epoch.items):
             return epoch.items[back[0]]
@@ -112,7 +101,7 @@ class CurrentItem:
 
     def current_since(self, item: Item) -> float:
         """Vehicle time [s] from which an item is flown that is current, or was just passed."""
-        latest = max(self._epoch.since, self._entered_at)
+        latest = max(self._epoch.since, self.mode.entered_at)
         if not self.passed.claims:
             return latest
         return next((claim.since for claim in self.passed.claims if any(
@@ -125,51 +114,9 @@ class CurrentItem:
             len(claim.items) > 1 and any(item is one for one in claim.items)
             for claim in self.passed.claims)
 
-    def note_in_mission(self, frame: int | None = None) -> None:
-        """Note that the vehicle is in mission mode.
-
-        Args:
-            frame: number of the frame that shows it; None: an earlier one does.
-        """
-        newest = self._positions.path.newest
-        if not self.in_mission:
-            self._entered_at = newest
-        self.in_mission, self._in_mission_at = True, newest
-        if frame is not None:
-            self._shown_until = max(self._shown_until, self._positions.sent_between(frame)[0])
-
-    @property
-    def left_unseen(self) -> bool:
-        """Whether it has left mission mode while no position came."""
-        begin, end = self._left_unseen
-        return not self.in_mission and begin <= end == self._left_at
-
-    @property
-    def may_have_left(self) -> bool:
-        """Whether positions are missing since it was in mission mode by the last message."""
-        path = self._positions.path
-        return self.in_mission and path.newest > self._in_mission_at and (
-            path.has_gap(self._in_mission_at, path.newest))
-
-    def note_other_mode(self, now: float) -> None:
-        """Note that the vehicle is not in mission mode, by whichever command."""
-        if not self.in_mission:
-            return
-        path, left_at = self._positions.path, self._positions.vehicle_time(now)
-        blind = left_at - path.newest > GAP
-        self.in_mission, self._left_at = False, left_at if blind else path.newest
-        self._left_frame, self._left_seen = self._frames.newest, max(left_at, path.newest)
-        if blind or path.has_gap(self._in_mission_at, self._left_at):
-            self._left_unseen = self._in_mission_at, self._left_at
-
-    @property
-    def left_at(self) -> float:
-        """Vehicle time [s] at which it left mission mode; inf while it is in it, or unknown."""
-        return math.inf if self.in_mission or math.isinf(self._left_at) else self._left_at
-
     def note_mission_left(self, now: float) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
-        self.note_other_mode(now)
+        self.mode.note_other_mode(now)
         self._epoch.started = self.set_by_other = None
 
     def note_report(self, seq: int, now: float, flying: bool, frame: int | None = None,
@@ -185,7 +132,7 @@ class CurrentItem:
             flew: whether it was sent in mission mode, which the vehicle has left since.
         """
         if flew and frame is not None:
-            self._flew_until = frame
+            self.mode.note_flew(frame)
         reports, epoch = self.reports, self._epoch
         reports.previous_frame = reports.last_frame
         # the last item stays current once it is reached
@@ -253,7 +200,7 @@ class CurrentItem:
         for claim in self.passed.claims:
             judged = self.passed.judge(claim, tuple(
                 i for i in claim.items if i.task not in self._tasks), now,
-                self.left_unseen_since(claim))
+                self.mode.left_unseen_since(claim))
             for item in judged.flown:
                 self._tasks.complete(item.task, item.place)
             self._pass_over(judged.passed_over, claim)
@@ -298,16 +245,11 @@ class CurrentItem:
         if not self.passed.claims:  # as at most calls
             return NO_TASKS, 0
         claims = [claim for claim in self.passed.claims
-                  if claim.in_flight or self.left_unseen_since(claim)]
+                  if claim.in_flight or self.mode.left_unseen_since(claim)]
         if not claims:
             return NO_TASKS, 0
-        left = 1 if any(map(self.left_unseen_since, claims)) else 2 * self.may_have_left
+        left = 1 if any(map(self.mode.left_unseen_since, claims)) else 2 * self.mode.may_have_left
         return frozenset(item.task for claim in claims for item in claim.items), left
-
-    def left_unseen_since(self, claim: Claim) -> bool:
-        """Whether it may have left mission mode unseen since it passed the items of a claim."""
-        begin, end = self._left_unseen
-        return claim.since < end and begin <= claim.until
 
     def claim(self, begin: int, end: int, now: float, frame: int | None = None,
               in_flight: bool = True) -> None:
@@ -331,29 +273,13 @@ class CurrentItem:
             return
         route = tuple(item for item in epoch.items[begin:] if item.position is not None)
         until = positions.vehicle_time(now)
-        if not self.in_mission:  # positions after it left mission mode prove nothing
-            until = min(until, max(epoch.since, self._flown_until(frame, until)))
+        if not self.mode.in_mission:  # positions after it left mission mode prove nothing
+            until = min(until, max(epoch.since, self.mode.flown_until(frame, until)))
         since = max(epoch.since, self._unflown_until) if in_flight else epoch.since
         self.passed.add(Claim(
             items, route, since, until, now + MAX_MESSAGE_DELAY, epoch.number,
             self._frames_of_reached(begin, end, now, frame), frame, skips, in_flight,
             first=epoch.items[begin], others_since=self._reported_until(begin)))
-
-    def _flown_until(self, frame: int | None, reported: float) -> float:
-        """Vehicle time [s] until which it may have flown what a report shows, in another mode.
-
-        Args:
-            frame: number of the report; None: not known.
-            reported: vehicle time [s] of the report.
-        """
-        left_at = self._left_at
-        if frame is not None and frame == self._flew_until:
-            return max(left_at, self._positions.sent_between(frame)[1])
-        if frame is not None and frame > self._left_frame and reported - left_at <= _AT_ONCE:
-            # it passed the item before it left: the next position may be of that moment
-            return max(left_at, min(
-                self._positions.sent_between(self._left_frame)[1], left_at + _NEXT))
-        return left_at
 
     def _reported_until(self, seq: int) -> float:
         """Vehicle time [s] until which an item was reported as current; -inf: it was not."""

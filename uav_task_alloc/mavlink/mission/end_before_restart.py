@@ -67,8 +67,8 @@ class EndBeforeRestart:
 
     def _flies(self, now: float) -> bool:
         """Whether it is in mission mode at `now` [s], or was until a moment ago."""
-        left_at, positions = self._moves.left_at, self._positions
-        return self._moves.in_mission or (math.isfinite(left_at) and max(
+        left_at, positions = self._moves.mode.left_at, self._positions
+        return self._moves.mode.in_mission or (math.isfinite(left_at) and max(
             positions.path.newest, positions.vehicle_time(now)) - left_at < MAX_MESSAGE_DELAY)
 
     def note_reached(self, seq: int, now: float) -> None:
@@ -109,7 +109,7 @@ class EndBeforeRestart:
         if self._ending is None or message.mission_state != dialect.MISSION_STATE_ACTIVE:
             return
         seq, item, deadline = self._ending
-        if message.seq == seq + 1 and now < deadline and not self._moves.in_mission:
+        if message.seq == seq + 1 and now < deadline and not self._moves.mode.in_mission:
             self._tasks.credit(item)
             self._ending = None
 
@@ -117,6 +117,7 @@ class EndBeforeRestart:
         """Complete the last item where it was inside: its REACHED may be lost before a cut."""
         epoch, moves, positions = self._epoch, self._moves, self._positions
         item = epoch.items[seq]
-        since, until = moves.current_since(item), min(positions.vehicle_time(now), moves.left_at)
-        if epoch.current == seq and positions.was_at(item, since, until, close=0.0):
+        until = min(positions.vehicle_time(now), moves.mode.left_at)
+        if epoch.current == seq and positions.was_at(
+                item, moves.current_since(item), until, close=0.0):
             self._tasks.credit(item)

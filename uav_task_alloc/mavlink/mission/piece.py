@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 
-from uav_task_alloc.geometry.polyline import point_at
-from uav_task_alloc.mavlink.mission.flown_path import PositionSample
+from uav_task_alloc.geometry.polyline import nearest_on_segment, point_at, segment_fraction
+from uav_task_alloc.mavlink.mission.flown_path import GAP, PositionSample
 from uav_task_alloc.model import Point
 
 _SAME = 1.0  # [m] between the ends of a closed way
-_SHORTEST = 1.0  # [m] of a flown part or of a rest
+SHORTEST = 1.0  # [m] of a flown part or of a rest
+SLACK = 10.0  # [m] of positions that are not exact
+SPEED_MARGIN = 1.2  # factor of a speed: how far a vehicle may have flown
 _COURSE_SPEED = 1.0  # [m/s] above which a vehicle has a course
 
 
@@ -62,6 +64,79 @@ class Piece:
         """Metres to the last point of the way that was passed: what is stored changes rarely."""
         return round(self.way_at[max(bisect_right(self.way_at, self.flown) - 1, 0)], 2)
 
+    @property
+    def left(self) -> float:
+        """Metres of the way that are not flown."""
+        return self.way_at[-1] - self.flown
+
+    def restart(self) -> None:
+        """Begin with the whole path again."""
+        self.low, self.high, self.flown, self.seen = 0.0, self.at[-1], 0.0, None
+        self.off, self.missed, self.gone, self.in_silence = None, False, False, False
+        self.measure()
+
+    def follow(self, sample: PositionSample, before: float, fastest: float, corridor: float,
+               mission_known: bool) -> None:
+        """Take a position of the vehicle, which may be on the way.
+
+        Args:
+            sample: the position.
+            before: vehicle time [s] of the position before.
+            fastest: [m/s] that it flies.
+            corridor: [m] from the way at which it still follows it.
+            mission_known: whether the mission on board is known.
+        """
+        if self.seen is None:
+            self.seen = min(before, sample.t) if math.isfinite(before) else sample.t
+        since, back = self.off or (self.seen, 0.0)
+        silent = sample.t - before > GAP
+        known = mission_known and not self.missed
+        gap = max(sample.t - since, 0.0) if known or not silent else 0.0
+        reach = max(SPEED_MARGIN * fastest * gap - back, 0.0) + SLACK
+        metres = self._metres(sample.position, reach, corridor)
+        if metres is not None:
+            self.flown, self.seen, self.off = max(self.flown, metres), sample.t, None
+            self.in_silence = False
+            return
+        if gap > GAP and silent and (
+                self.left + math.dist(sample.position, self.way[-1]) <= reach):
+            self.in_silence = True
+        # what it flies now it does not fly of the way
+        self.off = sample.t, math.dist(sample.position, self.next_point())
+
+    def continue_at(self, sample: PositionSample, corridor: float) -> bool:
+        """Continue at a position on the leg after the points that were passed.
+
+        Args:
+            sample: the position.
+            corridor: [m] from the way at which the vehicle still follows it.
+
+        Returns:
+            Whether it is there.
+        """
+        n = bisect_right(self.way_at, self.flown)
+        end = self.way_at[min(n, len(self.way) - 1)]
+        metres = self._metres(sample.position, end - self.flown + SLACK, corridor)
+        if metres is None or metres < self.flown:
+            return False
+        self.flown, self.seen = metres, sample.t
+        return True
+
+    def _metres(self, position: Point, reach: float, corridor: float) -> float | None:
+        """Where on the way the vehicle is [m]; None where it does not follow it."""
+        low, high = self.flown - SLACK, self.flown + reach
+        first = max(bisect_right(self.way_at, low) - 1, 0)
+        last = min(bisect_left(self.way_at, high), len(self.way) - 1)
+        best, found = corridor, None
+        for n in range(first, last):
+            a, b = self.way[n], self.way[n + 1]
+            away = math.dist(position, nearest_on_segment(position, a, b))
+            metres = self.way_at[n] + (self.way_at[n + 1] - self.way_at[n]) * (
+                segment_fraction(position, a, b))
+            if away <= best and metres <= high:
+                best, found = away, metres
+        return found
+
     def begun_by(self, sample: PositionSample, leg: int) -> float:
         """Return how far [m] from the beginning of a leg the vehicle was, by its course.
 
@@ -107,10 +182,10 @@ class Piece:
 
     def commit(self) -> bool:
         """Leave out the flown part from now on; whether there is one."""
-        if self.flown < _SHORTEST:
+        if self.flown < SHORTEST:
             self.flown, self.seen, self.off = 0.0, None, None
             return False
-        left = max(self.high - self.low - self.flown, _SHORTEST)
+        left = max(self.high - self.low - self.flown, SHORTEST)
         if self.reversed:
             self.high = self.low + left
         else:

@@ -6,16 +6,14 @@ A way is complete once it was followed to its last point; where it was left, the
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
 from collections import deque
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
 
-from uav_task_alloc.geometry.polyline import nearest_on_segment, segment_fraction
 from uav_task_alloc.mavlink.mission.flown_path import GAP, PositionSample
 from uav_task_alloc.mavlink.mission.item import Item
-from uav_task_alloc.mavlink.mission.piece import Piece
+from uav_task_alloc.mavlink.mission.piece import SHORTEST, SLACK, SPEED_MARGIN, Piece
 from uav_task_alloc.mavlink.mission.piece_mark import (
     PART_FLOWN,
     PART_MISSED,
@@ -27,11 +25,8 @@ from uav_task_alloc.mavlink.mission.task_list import MissionStop
 from uav_task_alloc.model import Point
 
 _CORRIDOR, _CORRIDOR_PLANE = 10.0, 150.0  # [m] from a way at which a vehicle still follows it
-_SLACK = 10.0  # [m] of positions that are not exact
 _LATE = 32  # positions: six seconds, by which the report of the current item may be late
 _RECENT = 512  # positions in which that report may be late in a simulation that runs faster
-_MARGIN = 1.2  # of a speed
-_SHORTEST = 1.0  # [m] of a flown part or of a rest
 _KEPT = 64  # pieces
 
 
@@ -131,8 +126,8 @@ class PieceCoverage:
             vehicle is not at its first point.
         """
         piece = self._pieces.get(item.task) if item is not None and item.along else None
-        return piece is not None and piece.flown < _SHORTEST and (
-            math.dist(place, piece.way[0]) > self.corridor + _SLACK)
+        return piece is not None and piece.flown < SHORTEST and (
+            math.dist(place, piece.way[0]) > self.corridor + SLACK)
 
     def is_followed(self, stop: MissionStop) -> bool:
         """Whether the vehicle is flying along the way of a stop, in the direction of the stop."""
@@ -185,13 +180,13 @@ class PieceCoverage:
                 recent[n].position, begin) <= self.corridor), None)
             if at is None and unseen is not None and 0 < len(recent) <= _LATE:
                 piece.seen, piece.off = unseen.t, (unseen.t, math.dist(unseen.position, begin))
-                self._follow(piece, recent[0], unseen.t, self._fastest)  # it came to it unseen
+                self._follow(piece, recent[0], unseen.t)  # it came to it unseen
             for sample in recent[-_LATE:] if at is None else recent[at:]:
-                self._follow(piece, sample, sample.t, self._fastest)
+                self._follow(piece, sample, sample.t)
             if piece.off is not None:  # it may have come to it since, or it cannot
                 since, back = piece.off
-                piece.missed = back > self.corridor + _SLACK + (
-                    _MARGIN * self._fastest * max(vehicle_now() - since, 0.0))
+                piece.missed = back > self.corridor + SLACK + (
+                    SPEED_MARGIN * self._fastest * max(vehicle_now() - since, 0.0))
 
     def note_replaced(self, item: Item | None) -> None:
         """Note another mission: what is flown from now on is not of a way left by it.
@@ -230,48 +225,15 @@ class PieceCoverage:
         for name in {self._under_way, self._ending, *self._restored}:
             piece = self._pieces.get(name or '')
             if piece is not None and not piece.gone:
-                self._follow(piece, sample, before, fastest)
+                self._follow(piece, sample, before)
                 piece.missed = piece.off is not None
 
     def _forget_recent(self) -> None:
         self._recent.clear()
         self._unseen_since = None
 
-    def _follow(self, piece: Piece, sample: PositionSample, before: float,
-                fastest: float) -> None:
-        if piece.seen is None:
-            piece.seen = min(before, sample.t) if math.isfinite(before) else sample.t
-        since, back = piece.off or (piece.seen, 0.0)
-        silent = sample.t - before > GAP
-        known = self.mission_known and not piece.missed
-        gap = max(sample.t - since, 0.0) if known or not silent else 0.0
-        reach = max(_MARGIN * fastest * gap - back, 0.0) + _SLACK
-        metres = self._metres(piece, sample.position, reach)
-        if metres is not None:
-            piece.flown, piece.seen, piece.off = max(piece.flown, metres), sample.t, None
-            piece.in_silence = False
-            return
-        if gap > GAP and silent and (
-                piece.way_at[-1] - piece.flown + math.dist(sample.position, piece.way[-1])
-                <= reach):
-            piece.in_silence = True
-        # what it flies now it does not fly of the way
-        piece.off = sample.t, math.dist(sample.position, piece.next_point())
-
-    def _metres(self, piece: Piece, position: Point, reach: float) -> float | None:
-        """Where on its way the vehicle is [m]; None where it does not follow it."""
-        low, high = piece.flown - _SLACK, piece.flown + reach
-        first = max(bisect_right(piece.way_at, low) - 1, 0)
-        last = min(bisect_left(piece.way_at, high), len(piece.way) - 1)
-        best, found = self.corridor, None
-        for n in range(first, last):
-            a, b = piece.way[n], piece.way[n + 1]
-            away = math.dist(position, nearest_on_segment(position, a, b))
-            metres = piece.way_at[n] + (piece.way_at[n + 1] - piece.way_at[n]) * (
-                segment_fraction(position, a, b))
-            if away <= best and metres <= high:
-                best, found = away, metres
-        return found
+    def _follow(self, piece: Piece, sample: PositionSample, before: float) -> None:
+        piece.follow(sample, before, self._fastest, self.corridor, self.mission_known)
 
     def covers(self, task: str, vehicle_now: float, fastest: float) -> bool:
         """Whether the whole way of a task was flown, as far as is known.
@@ -284,14 +246,14 @@ class PieceCoverage:
         piece = self._pieces.get(task)
         if piece is None or math.isinf(self._sampled):
             return True
-        left = piece.way_at[-1] - piece.flown
-        if left <= self.corridor + _SLACK or piece.in_silence:
+        left = piece.left
+        if left <= self.corridor + SLACK or piece.in_silence:
             return True
         # nothing was received since it was on its way
         blind = self.mission_known and piece.seen is not None and (
             self._sampled <= piece.seen and not piece.missed and not piece.gone)
         left += piece.off[1] if piece.off is not None else 0.0
-        return blind and left <= _SLACK + self.corridor + _MARGIN * fastest * max(
+        return blind and left <= SLACK + self.corridor + SPEED_MARGIN * fastest * max(
             0.0, vehicle_now - (piece.seen or 0.0))
 
     def covered_before(self, task: str) -> bool:
@@ -305,16 +267,14 @@ class PieceCoverage:
         """
         piece = self._pieces.get(task)
         return piece is None or piece.in_silence or (
-            piece.way_at[-1] - piece.flown <= self.corridor + _SLACK)
+            piece.left <= self.corridor + SLACK)
 
     def forget(self, task: str) -> None:
         """Fly the whole way of a task again."""
         piece = self._pieces.get(task)
         self._partly.pop(task, None)
         if piece is not None:
-            piece.low, piece.high, piece.flown, piece.seen = 0.0, piece.at[-1], 0.0, None
-            piece.off, piece.missed, piece.gone, piece.in_silence = None, False, False, False
-            piece.measure()
+            piece.restart()
             self.version += 1
 
     def leave(self) -> None:
@@ -364,22 +324,17 @@ class PieceCoverage:
             if mark.state == PART_UNDER_WAY:
                 self._restored.add(mark.task)
             if mark.state == PART_UNDER_WAY and samples:
-                self._place(piece, samples[0].position, samples[0].t)
+                self._continue(piece, samples[0])
                 for before, sample in pairwise(samples):
-                    self._follow(piece, sample, before.t, fastest)
+                    piece.follow(sample, before.t, fastest, self.corridor, self.mission_known)
                 self._sampled = max(self._sampled, samples[-1].t)
             if piece.reversed != stop.reversed:
                 self._turn(piece, stop.task.path, stop.reversed)
             self.version += 1
 
-    def _place(self, piece: Piece, position: Point, t: float) -> None:
-        """Continue at a position on the leg after the points that were passed."""
-        n = bisect_right(piece.way_at, piece.flown)
-        end = piece.way_at[min(n, len(piece.way) - 1)]
-        metres = self._metres(piece, position, end - piece.flown + _SLACK)
-        if metres is not None and metres >= piece.flown:
-            piece.flown, piece.seen = metres, t
-            self._sampled = max(self._sampled, t)
+    def _continue(self, piece: Piece, sample: PositionSample) -> None:
+        if piece.continue_at(sample, self.corridor):
+            self._sampled = max(self._sampled, sample.t)
 
     def continue_at(self, item: Item | None, sample: PositionSample | None) -> None:
         """Take the points before the item being flown as passed, where nothing was stored.
@@ -390,11 +345,11 @@ class PieceCoverage:
         """
         piece = self._pieces.get(item.task) if item is not None and item.along else None
         if piece is None or item is None or self.recorded or piece.seen is not None or (
-                piece.flown >= _SHORTEST or item.position is None):
+                piece.flown >= SHORTEST or item.position is None):
             return
         place = item.position
         n = min(range(1, len(piece.way)), key=lambda k: math.dist(piece.way[k], place))
         piece.flown = piece.way_at[n - 1]
         # set by another station, it flies to the item from elsewhere
         if sample is not None and piece.begun_by(sample, n - 1) <= self.corridor:
-            self._place(piece, sample.position, sample.t)
+            self._continue(piece, sample)

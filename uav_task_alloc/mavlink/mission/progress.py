@@ -70,6 +70,7 @@ class ProgressTable:
             self.positions, ReachedSeries(self.positions, repeats, self._frames))
         self._moves = CurrentItem(
             self._epoch, self._tasks, self.positions, self._epochs, self._frames)
+        self._mode = self._moves.mode
         self._reached = ReachedItems(
             self._epoch, self._tasks, self.positions, self._epochs, self._moves, repeats)
         self.end_before_restart = EndBeforeRestart(
@@ -133,6 +134,11 @@ class ProgressTable:
         claims, doubtful = self._moves.passed.claims, self._tasks.doubtful
         return frozenset(chain((i.task for claim in claims for i in claim.items), doubtful)) if (
             claims or doubtful) else NO_TASKS
+
+    @property
+    def done(self) -> frozenset[str]:
+        """Ids of the completed tasks, and of those that are pending."""
+        return self.pending.union(self.completed)
 
     @property
     def passed_in_order(self) -> frozenset[str]:
@@ -251,7 +257,7 @@ class ProgressTable:
     def note_mission_mode(self) -> None:
         """Note that the vehicle flies its mission: the task of the current item has started."""
         epoch, item = self._epoch, self.active
-        self._moves.note_in_mission()
+        self._mode.note_in_mission()
         if item and item.task and item.task != epoch.started and item.task not in self._tasks:
             epoch.started = item.task
             self._tasks.start(item.task)
@@ -262,11 +268,11 @@ class ProgressTable:
         Args:
             frame: number of the frame that shows it; None: an earlier one does.
         """
-        self._moves.note_in_mission(frame)
+        self._mode.note_in_mission(frame)
 
     def note_other_mode(self, now: float) -> None:
         """Note that the vehicle is not in mission mode, by whichever command."""
-        self._moves.note_other_mode(now)
+        self._mode.note_other_mode(now)
         self.coverage.note_active(None, False)
 
     def note_mission_left(self, now: float) -> None:
@@ -318,7 +324,7 @@ class ProgressTable:
 
     def may_have_ended_unseen(self, seq: int) -> bool:
         """Whether it left mission mode while no position came, with item `seq` as the last."""
-        return seq == self.last_flown and self._moves.left_unseen
+        return seq == self.last_flown and self._mode.left_unseen
 
     def note_mission_complete(self, seq: int, now: float, frame: int | None = None) -> None:
         """Take the vehicle's report that its mission is complete up to item `seq`."""
@@ -368,7 +374,7 @@ class ProgressTable:
 
     def was_exactly_at(self, item: Item, when: float, since: float = -math.inf) -> bool:
         """Whether it was within the radius of an item in mission mode; see `was_at_by`."""
-        until = min(self.positions.vehicle_time(when), self._moves.left_at)
+        until = min(self.positions.vehicle_time(when), self._mode.left_at)
         return self.positions.was_at(item, max(self._epoch.since, since), until, close=0.0)
 
     def near_one(self, item: Item, other: Item | None, when: float) -> bool:
@@ -376,7 +382,7 @@ class ProgressTable:
         return self.positions.near_one(item, other, when)
 
     def _note_active(self) -> None:
-        self.coverage.note_active(self.active, self._moves.in_mission, self._vehicle_now,
+        self.coverage.note_active(self.active, self._mode.in_mission, self._vehicle_now,
                                   self.items)
 
     def _vehicle_now(self) -> float:

@@ -93,7 +93,7 @@ class ReachedItems:
         """
         epoch, seq = self._epoch, reached.seq
         current = CurrentEpoch(epoch.items, self._moves.reports.reported, epoch.since,
-                               epoch.begin, epoch.taken, self._moves.left_at)
+                               epoch.begin, epoch.taken, self._moves.mode.left_at)
         # PX4 may still repeat one of the mission before: a jump over several items is no proof
         repeated = self._epochs.series.repeats_credited(reached)
         if 0 <= seq < len(epoch.items) and not (
