@@ -87,7 +87,7 @@ class TimedRoutes(NamedTuple):
     counts: Ints  # (2)
     empty: Ints  # (classes) number of empty routes
     way: Links  # (nodes, 2) rows where each is entered and left
-    reach: Floats  # (nodes, 2) columns INNER and OUTER, of tasks
+    reach: Floats  # (nodes, 4) columns from INNER, of tasks
     idle: Ints  # (classes) index in TimedArrays.members of one that was empty lately
 
 

@@ -96,6 +96,7 @@ def _place_beside(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
         late = opened + apart * pace - r.row[c, at.LATEST] - a.least_cut
     if not open_end and a.weight[at.BY_DISTANCE] * (2.0 * apart - leg) >= least:
         return -1
+    late -= r.route[u, at.WARP]  # a place can end what the route has
     if excess_price(a.price[at.WARP], late) >= least or _price_of_load(a, r, u, t) >= least:
         return -1
     return SIGNED(before)
@@ -114,39 +115,45 @@ def _with_empty_first_trip(a: TimedArrays, r: TimedRoutes, c: int) -> int:
 
 
 @inline_kernel
-def _within_reach(a: TimedArrays, r: TimedRoutes, i: int, side: int, least: float) -> int:
-    """The first of these sides of neighbours of task i where a place may cost less. O(k).
+def _within_reach(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: float) -> int:
+    """The first of these sides of neighbours of task t where a place may cost less. O(k).
 
-    Most neighbours are passed over, by what a few lines of the cache hold.
+    Most neighbours are passed over, by what a few lines of the cache hold: their legs, and the
+    time from a departure to the latest start after it.
     """
     if side & 1:
         return side
-    weight, base_way = a.weight[at.BY_DISTANCE], a.fixed[a.uavs + i, at.BASE_WAY]
-    k = side >> 1
+    i, k, base_way = t - a.uavs, side >> 1, a.fixed[t, at.BASE_WAY]
+    weight, price = a.weight[at.BY_DISTANCE], a.price[at.WARP]
+    service = a.fixed[t, at.SERVICE] - a.least_cut
     while k < a.near_count[i]:
         c, apart = a.near[i, k], a.near_length[i, k]
-        inner, outer = apart - r.reach[c, at.INNER], base_way - r.reach[c, at.OUTER]
-        if not weight * (apart + (inner if inner < outer else outer)) >= least:
+        passes = service + apart * a.least_pace
+        inner = weight * (2.0 * apart - r.reach[c, at.INNER]) + excess_price(
+            price, passes + apart * a.least_pace - r.reach[c, at.INNER_GAP])
+        outer = weight * (apart + base_way - r.reach[c, at.OUTER]) + excess_price(
+            price, passes + base_way * a.least_pace - r.reach[c, at.OUTER_GAP])
+        if not (inner if inner < outer else outer) >= least:
             break
         k += 1
     return int(side if k == side >> 1 else 2 * k)
 
 
 @inline_kernel
-def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: float,
-                    rng: RngState) -> tuple[int, int, float]:
+def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: float, most: float,
+               rng: RngState) -> tuple[int, int, float]:
     """The cheapest place beside neighbours and in empty routes: (node before, kind, cost). O(k).
 
-    TURNED is part of the kind.
+    TURNED is part of the kind; the node is -1 where none costs less than `most`.
 
     opens: empty routes are tried, too. Each place is skipped with probability `blinks`, but for
     an empty first trip.
     """
-    i, place, kind, least = t - a.uavs, -1, NO_VISIT, math.inf
+    i, place, kind, least = t - a.uavs, -1, NO_VISIT, most
     sides, m = 2 * a.near_count[i], -1
     last = sides + (a.near_class.shape[1] if opens else 0)
     while True:
-        m = _within_reach(a, r, i, m + 1, least)
+        m = _within_reach(a, r, t, m + 1, least)
         if m >= last:
             break
         if m < sides:
@@ -228,7 +235,7 @@ def unlink(a: TimedArrays, r: TimedRoutes, t: int) -> None:
     r.route[u, at.METRES] += added
     r.sums[at.METRES] += added
     r.link[t, at.OF_UAV] = LINK(a.uavs)
-    r.reach[t, at.INNER] = r.reach[t, at.OUTER] = -math.inf
+    r.reach[t, :] = -math.inf
     if not is_task(a, t):
         return
     if not a.whole:
@@ -252,7 +259,7 @@ def insert_in_order(a: TimedArrays, r: TimedRoutes, tasks: Ints, prizes: bool,
         t = LINK(tasks[i])
         if r.link[t, at.OF_UAV] != a.uavs:
             continue
-        place, kind, cost = near_place(a, r, t, True, 0.0, rng)
+        place, kind, cost = near_place(a, r, t, True, 0.0, math.inf, rng)
         if place < 0:
             place, kind, cost = place_anywhere(a, r, t)
         if place >= 0 and (not prizes or cost < a.unserved[t - a.uavs]):

@@ -28,7 +28,7 @@ from uav_task_alloc.solver.timed.insertion import (
 from uav_task_alloc.solver.timed.legs import slot_of
 from uav_task_alloc.solver.timed.places import cheapest_direction
 from uav_task_alloc.solver.timed.route_sums import cost_of
-from uav_task_alloc.solver.timed.segments import set_reach, update
+from uav_task_alloc.solver.timed.segments import update
 from uav_task_alloc.solver.timed.ways import has_paths, is_task
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
@@ -45,6 +45,7 @@ class Round(NamedTuple):
     node: Links  # (nodes) saved rows: their nodes
     link: Links  # (nodes, 4)
     way: Links  # (nodes, 2)
+    reach: Floats  # (nodes, 4)
     row: Floats  # (nodes, columns from START)
     uav: Ints  # (m) saved routes: their UAVs
     route: Floats  # (m, columns from WARP)
@@ -62,7 +63,7 @@ def empty_round(a: TimedArrays) -> Round:
     """An empty round with room for any."""
     nodes, m, n = node_count(a), a.uavs, a.ends - a.uavs
     return Round(np.empty(nodes, LINK), np.empty((nodes, 4), LINK), np.empty((nodes, 2), LINK),
-                 np.empty((nodes, at.ROW_COLUMNS)), np.empty(m, np.int64),
+                 np.empty((nodes, 4)), np.empty((nodes, at.ROW_COLUMNS)), np.empty(m, np.int64),
                  np.empty((m, at.ROUTE_COLUMNS)), np.empty((len(a.limit), at.TRIP_COLUMNS)),
                  np.empty(at.SUM_COLUMNS), np.empty(2, np.int64), np.empty(n + 1, LINK),
                  np.empty(n + 1), np.full(m, -1, np.int64), np.empty(n + 1, LINK),
@@ -94,7 +95,7 @@ def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
     while True:
         w.node[k] = i
         for c in range(4):
-            w.link[k, c] = r.link[i, c]
+            w.link[k, c], w.reach[k, c] = r.link[i, c], r.reach[i, c]
         if has_paths(a):
             w.way[k, 0], w.way[k, 1] = r.way[i, 0], r.way[i, 1]
         for c in range(at.RATE):
@@ -118,7 +119,7 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
     """Restore all routes that the round changed. O(their tasks)."""
     for k in range(w.counts[REMOVED]):
         r.link[w.removed[k], at.OF_UAV] = LINK(a.uavs)
-        r.reach[w.removed[k], at.INNER] = r.reach[w.removed[k], at.OUTER] = -math.inf
+        r.reach[w.removed[k], :] = -math.inf
     for k in range(w.counts[SAVED_ROUTES]):
         u = w.uav[k]
         if (r.route[u, at.TASKS] == 0.0) != (w.route[k, at.TASKS] == 0.0):
@@ -139,7 +140,8 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
             for c in range(at.RATE, at.ROW_COLUMNS):
                 r.row[i, c] = w.row[k, c]
         if is_task(a, i):
-            set_reach(a, r, i)
+            for c in range(4):
+                r.reach[i, c] = w.reach[k, c]
         elif i < a.uavs or i >= a.bases:
             slot = slot_of(a, i)
             for c in range(at.TRIP_COLUMNS):
@@ -348,10 +350,11 @@ def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, by
         t = w.removed[i]
         if r.link[t, at.OF_UAV] != a.uavs:
             continue
-        place, kind, cost = near_place(a, r, t, True, blinks, rng)
+        most = generous * a.unserved[t - a.uavs]
+        place, kind, cost = near_place(a, r, t, True, blinks, most, rng)
         if place < 0 and uniform(rng) < ANYWHERE_RATE:
             place, kind, cost = place_anywhere(a, r, t)
-        if place >= 0 and cost < generous * a.unserved[t - a.uavs]:
+        if place >= 0 and cost < most:
             insert_saved(a, r, w, t, LINK(place), kind)
         waiting -= a.unserved[t - a.uavs]
         if cost_of(a, r.sums) - waiting >= limit:

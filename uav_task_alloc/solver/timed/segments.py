@@ -20,20 +20,47 @@ from uav_task_alloc.solver.timed.ways import has_paths, is_task, service_of
 
 
 @inline_kernel
+def _gap(a: TimedArrays, r: TimedRoutes, i: int, j: int) -> float:
+    """Time [s] from the departure of node i to the latest start of j after it. O(1).
+
+    inf where j is late already, or where a visit of the base may change the departure.
+    """
+    departure, latest = r.row[i, at.DEPARTURE], r.row[j, at.LATEST]
+    late = after_leg(a, departure, r.row[i, at.TIME], j) > latest
+    return math.inf if late or a.visits > 0 else float(latest - departure)
+
+
+@inline_kernel
 def set_reach(a: TimedArrays, r: TimedRoutes, i: int) -> None:
-    """Set TimedRoutes.reach of node i, whose neighbours in its route are known. O(1)."""
-    inner = outer = -math.inf
-    if r.link[i, at.NEXT] < a.ends:
-        inner = r.row[i, at.LEG]
+    """Set TimedRoutes.reach of task i, whose neighbours in its route are up to date. O(1)."""
+    before, then = r.link[i, at.PREV], r.link[i, at.NEXT]
+    inner = outer = inner_gap = outer_gap = -math.inf
+    if then < a.ends:
+        inner, inner_gap = r.row[i, at.LEG], _gap(a, r, i, then)
     else:
-        outer = r.row[i, at.LEG]
-    if is_task(a, r.link[i, at.PREV]):
+        outer, outer_gap = r.row[i, at.LEG], _gap(a, r, i, then)
+    if is_task(a, before):
         inner = max(inner, r.row[i, at.LEG_TO])
+        inner_gap = max(inner_gap, _gap(a, r, before, i))
     else:
         outer = max(outer, r.row[i, at.LEG_TO])
+        outer_gap = max(outer_gap, _gap(a, r, before, i))
     if outer > -math.inf and (a.visits > 0 or has_paths(a)):
         outer = math.inf  # a visit of the base may cost less than its way
     r.reach[i, at.INNER], r.reach[i, at.OUTER] = inner, outer
+    r.reach[i, at.INNER_GAP], r.reach[i, at.OUTER_GAP] = inner_gap, outer_gap
+
+
+@inline_kernel
+def _set_reaches(a: TimedArrays, r: TimedRoutes, first: int, last: int) -> None:
+    """Set TimedRoutes.reach of all tasks from node `first` to node `last`. O(tasks)."""
+    i = first
+    while True:
+        if is_task(a, i):
+            set_reach(a, r, i)
+        if i == last:
+            break
+        i = r.link[i, at.NEXT]
 
 
 @inline_kernel
@@ -81,25 +108,21 @@ def update_part(a: TimedArrays, r: TimedRoutes, u: int, first: int, last: int,
 
     Goes on from them in both directions until nothing changes. O(tasks) at worst, O(1) mostly.
     """
-    i, passed, end = first, first == last, a.ends + u
-    set_reach(a, r, first)
-    while i != end:
-        j = r.link[i, at.NEXT]
-        changed = _step_forward(a, r, u, i, j)
-        if not passed:
-            set_reach(a, r, j)
+    to, passed, end = first, first == last, a.ends + u
+    while to != end:
+        i, to = to, r.link[to, at.NEXT]
+        changed = _step_forward(a, r, u, i, to)
         if passed and not changed:
             break
-        passed = passed or j == last
-        i = j
-    j, passed = last, first == last
-    while j != u:
-        i = r.link[j, at.PREV]
-        changed = _step_backward(a, r, u, i, j, -math.inf)
+        passed = passed or to == last
+    back, passed = last, first == last
+    while back != u:
+        j, back = back, r.link[back, at.PREV]
+        changed = _step_backward(a, r, u, back, j, -math.inf)
         if passed and not changed:
             break
-        passed = passed or i == first
-        j = i
+        passed = passed or back == first
+    _set_reaches(a, r, back, to)
     update_route(a, r, u, before)
 
 
@@ -135,7 +158,6 @@ def _trip_forward(a: TimedArrays, r: TimedRoutes, u: int, head: int) -> int:
         r.row[j, at.LASTED] = lasted + wait + service_of(a, r, u, j)
         r.row[j, at.LOAD_BEFORE], r.row[j, at.LENGTH_BEFORE] = load, metres
         r.link[j, at.HEAD] = head
-        set_reach(a, r, j)
         i = j
     r.trip[slot, at.CARRIED], r.trip[slot, at.FLOWN] = load, metres
     r.trip[slot, at.AIRBORNE] = lasted
@@ -206,6 +228,7 @@ def update_whole(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None:
         if head == u:
             break
         last = head
+    _set_reaches(a, r, u, end)
     update_route(a, r, u, before)
 
 
