@@ -202,14 +202,17 @@ def cheapest_place(a, routes, t):
 @pytest.mark.parametrize('objective', ['distance', 'response'])
 @pytest.mark.parametrize('priced', [True, False])
 @pytest.mark.parametrize('whole', [True, False])
-def test_neighbours_passed_over_have_no_cheaper_place(returns, grain, objective, priced, whole):
+@pytest.mark.parametrize('gaps', [True, False])
+def test_neighbours_passed_over_have_no_cheaper_place(
+        returns, grain, objective, priced, whole, gaps):
     fleet, work = mixed_problem(12)
     if not whole:
         fleet = [replace(uav, endurance=math.inf) for uav in fleet]
         work = [replace(task, payload=0.0) for task in work]
     rules = Rules(returns=returns, grain=grain, objective=OBJECTIVES[objective])
     problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3,
+                         replace(COLD, by_gaps=gaps))
     if priced:
         colony._allow_excess()
     colony.fly(0.0, 0.01, 500)
@@ -232,13 +235,19 @@ def gap(a, routes, i, j):
     """From the departure of node i to the latest start of node j, unless j is late already."""
     departure, latest = routes.row[i, at.DEPARTURE], routes.row[j, at.LATEST]
     arrival = max(departure, a.fixed[j, at.RELEASE]) + routes.row[i, at.TIME]
-    return math.inf if arrival > latest else latest - departure
+    return math.inf if arrival > latest or not a.gaps else latest - departure
 
 
-def test_reach_kept_during_search_is_that_of_the_legs():
+@pytest.mark.parametrize('whole', [True, False])
+@pytest.mark.parametrize('gaps', [True, False])
+def test_reach_kept_during_search_is_that_of_the_legs(whole, gaps):
     fleet, work = mixed_problem(13)
+    if not whole:
+        fleet = [replace(uav, endurance=math.inf) for uav in fleet]
+        work = [replace(task, payload=0.0) for task in work]
     problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules(returns=True)), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3,
+                         replace(COLD, by_gaps=gaps))
     colony.fly(0.0, 0.5, 2000)
     a, routes = colony.arrays, colony.routes
     for t in range(a.uavs, a.ends):

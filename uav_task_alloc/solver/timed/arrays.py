@@ -74,6 +74,7 @@ class TimedArrays(NamedTuple):
     class_of: Ints  # (m)
     least_pace: float  # [s] of a way for each metre between its ends, at least
     least_cut: float  # [s] by which cut lengths shorten a way over two legs, at most
+    gaps: bool  # TimedRoutes.reach is kept of times too: pays where many tasks have no place
 
 
 class TimedRoutes(NamedTuple):

@@ -50,6 +50,7 @@ class TimedParams:
     least_price: float = 0.0  # of a task after the restart, over what served ones cost by value
     nearly_last: float = 3.0  # temperatures before the last end of a route from which all count
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
+    by_gaps: bool = False  # places are passed over by the times they leave, not only by legs
     intensifies: bool = False  # where there are many tasks, also as an Intensifier does
 
 
@@ -58,7 +59,7 @@ COLD = TimedParams(intensifies=True)
 SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
                         short_end_temperature=1.3, restart=0.6,
                         reheat_temperature=6.0, ruin=10.0, skipped=0.3, by_value=0.3,
-                        least_price=10.0, first_price=math.inf)
+                        least_price=10.0, by_gaps=True, first_price=math.inf)
 WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
                    short_end_temperature=0.02, first_price=math.inf)
 # many tasks are new: half of the time each from the earlier routes, and from new ones
@@ -81,7 +82,8 @@ class TimedColony:
                  params: TimedParams, begin: Incumbent | None = None) -> None:
         arrays = problem.arrays
         self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy(),
-                                      weight=arrays.weight.copy())
+                                      weight=arrays.weight.copy(),
+                                      gaps=params.by_gaps or problem.prizes)
         self.best = copy_incumbent(start)
         self._params, self._scale = params, problem.scale
         self._goal, self._decided = problem.base.rules.objective, False

@@ -128,13 +128,17 @@ def _within_reach(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
     service = a.fixed[t, at.SERVICE] - a.least_cut
     while k < a.near_count[i]:
         c, apart = a.near[i, k], a.near_length[i, k]
-        passes = service + apart * a.least_pace
-        inner = weight * (2.0 * apart - r.reach[c, at.INNER]) + excess_price(
-            price, passes + apart * a.least_pace - r.reach[c, at.INNER_GAP])
-        outer = weight * (apart + base_way - r.reach[c, at.OUTER]) + excess_price(
-            price, passes + base_way * a.least_pace - r.reach[c, at.OUTER_GAP])
-        if not (inner if inner < outer else outer) >= least:
-            break
+        inner, outer = apart - r.reach[c, at.INNER], base_way - r.reach[c, at.OUTER]
+        if not weight * (apart + (inner if inner < outer else outer)) >= least:
+            if not a.gaps:
+                break
+            passes = service + apart * a.least_pace
+            late = passes + apart * a.least_pace - r.reach[c, at.INNER_GAP]
+            inner = weight * (apart + inner) + excess_price(price, late)
+            late = passes + base_way * a.least_pace - r.reach[c, at.OUTER_GAP]
+            outer = weight * (apart + outer) + excess_price(price, late)
+            if not (inner if inner < outer else outer) >= least:
+                break
         k += 1
     return int(side if k == side >> 1 else 2 * k)
 

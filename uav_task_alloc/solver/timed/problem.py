@@ -88,7 +88,7 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
         np.empty((n, min(WINDOW_NEIGHBOURS, max(0, n - 1)))), np.zeros(n, np.int64),
         np.full((n, min(NEAR_CLASSES, classes)), -1, np.int64), order.astype(np.int64),
         np.searchsorted(class_of[order], np.arange(classes + 1)).astype(np.int64), class_of,
-        *_least_pace(problem))
+        *_least_pace(problem), False)
     arrays.restricted[:] = ~arrays.compatible.all(axis=(0, 1)) if m else False
     scale = _fill(problem, arrays, known)
     _set_prices(problem, arrays, scale)

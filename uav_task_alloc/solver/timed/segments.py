@@ -23,44 +23,45 @@ from uav_task_alloc.solver.timed.ways import has_paths, is_task, service_of
 def _gap(a: TimedArrays, r: TimedRoutes, i: int, j: int) -> float:
     """Time [s] from the departure of node i to the latest start of j after it. O(1).
 
-    inf where j is late already, or where a visit of the base may change the departure.
+    inf where j is late already, where a visit of the base may change the departure, and where it
+    is not asked for.
     """
+    if not a.gaps or a.visits > 0:
+        return math.inf
     departure, latest = r.row[i, at.DEPARTURE], r.row[j, at.LATEST]
     late = after_leg(a, departure, r.row[i, at.TIME], j) > latest
-    return math.inf if late or a.visits > 0 else float(latest - departure)
+    return math.inf if late else float(latest - departure)
 
 
 @inline_kernel
-def set_reach(a: TimedArrays, r: TimedRoutes, i: int) -> None:
-    """Set TimedRoutes.reach of task i, whose neighbours in its route are up to date. O(1)."""
-    before, then = r.link[i, at.PREV], r.link[i, at.NEXT]
-    inner = outer = inner_gap = outer_gap = -math.inf
-    if then < a.ends:
-        inner, inner_gap = r.row[i, at.LEG], _gap(a, r, i, then)
-    else:
-        outer, outer_gap = r.row[i, at.LEG], _gap(a, r, i, then)
-    if is_task(a, before):
-        inner = max(inner, r.row[i, at.LEG_TO])
-        inner_gap = max(inner_gap, _gap(a, r, before, i))
-    else:
-        outer = max(outer, r.row[i, at.LEG_TO])
-        outer_gap = max(outer_gap, _gap(a, r, before, i))
-    if outer > -math.inf and (a.visits > 0 or has_paths(a)):
-        outer = math.inf  # a visit of the base may cost less than its way
-    r.reach[i, at.INNER], r.reach[i, at.OUTER] = inner, outer
-    r.reach[i, at.INNER_GAP], r.reach[i, at.OUTER_GAP] = inner_gap, outer_gap
+def _set_reach(a: TimedArrays, r: TimedRoutes, first: int, last: int) -> None:
+    """Set TimedRoutes.reach of all tasks from node `first` to node `last`. O(tasks).
 
-
-@inline_kernel
-def _set_reaches(a: TimedArrays, r: TimedRoutes, first: int, last: int) -> None:
-    """Set TimedRoutes.reach of all tasks from node `first` to node `last`. O(tasks)."""
-    i = first
-    while True:
-        if is_task(a, i):
-            set_reach(a, r, i)
+    What else is known of these nodes, and of those beside them, is up to date.
+    """
+    i, before = first, r.link[first, at.PREV]
+    if not is_task(a, i):
+        before, i = i, r.link[i, at.NEXT]
+    gap_before = _gap(a, r, before, i)
+    while is_task(a, i):
+        then = r.link[i, at.NEXT]
+        gap = _gap(a, r, i, then)
+        inner = outer = inner_gap = outer_gap = -math.inf
+        if then < a.ends:
+            inner, inner_gap = r.row[i, at.LEG], gap
+        else:
+            outer, outer_gap = r.row[i, at.LEG], gap
+        if is_task(a, before):
+            inner, inner_gap = max(inner, r.row[i, at.LEG_TO]), max(inner_gap, gap_before)
+        else:
+            outer, outer_gap = max(outer, r.row[i, at.LEG_TO]), max(outer_gap, gap_before)
+        if outer > -math.inf and (a.visits > 0 or has_paths(a)):
+            outer = math.inf  # a visit of the base may cost less than its way
+        r.reach[i, at.INNER], r.reach[i, at.OUTER] = inner, outer
+        r.reach[i, at.INNER_GAP], r.reach[i, at.OUTER_GAP] = inner_gap, outer_gap
         if i == last:
             break
-        i = r.link[i, at.NEXT]
+        before, i, gap_before = i, then, gap
 
 
 @inline_kernel
@@ -122,7 +123,7 @@ def update_part(a: TimedArrays, r: TimedRoutes, u: int, first: int, last: int,
         if passed and not changed:
             break
         passed = passed or back == first
-    _set_reaches(a, r, back, to)
+    _set_reach(a, r, back if a.gaps else first, to if a.gaps else last)
     update_route(a, r, u, before)
 
 
@@ -225,10 +226,10 @@ def update_whole(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None:
     last = end
     while True:
         head = _trip_backward(a, r, u, last)
+        _set_reach(a, r, head, last)
         if head == u:
             break
         last = head
-    _set_reaches(a, r, u, end)
     update_route(a, r, u, before)
 
 
