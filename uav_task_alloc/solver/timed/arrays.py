@@ -74,7 +74,7 @@ class TimedArrays(NamedTuple):
     class_of: Ints  # (m)
     least_pace: float  # [s] of a way for each metre between its ends, at least
     least_cut: float  # [s] by which cut lengths shorten a way over two legs, at most
-    gaps: bool  # TimedRoutes.reach is kept of times too: pays where many tasks have no place
+    gaps: bool  # TimedRoutes.gap is kept up to date: pays where many tasks have no place
 
 
 class TimedRoutes(NamedTuple):
@@ -88,7 +88,8 @@ class TimedRoutes(NamedTuple):
     counts: Ints  # (2)
     empty: Ints  # (classes) number of empty routes
     way: Links  # (nodes, 2) rows where each is entered and left
-    reach: Floats  # (nodes, 4) columns from INNER, of tasks
+    reach: Floats  # (nodes, 2) columns INNER and OUTER, of tasks
+    gap: Floats  # (nodes, 2) columns INNER and OUTER, of tasks; as asked for by TimedArrays.gaps
     idle: Ints  # (classes) index in TimedArrays.members of one that was empty lately
 
 

@@ -81,9 +81,9 @@ class TimedColony:
     def __init__(self, problem: TimedProblem, start: Incumbent, seed: int,
                  params: TimedParams, begin: Incumbent | None = None) -> None:
         arrays = problem.arrays
+        gaps = (params.by_gaps or problem.prizes) and arrays.visits == 0
         self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy(),
-                                      weight=arrays.weight.copy(),
-                                      gaps=params.by_gaps or problem.prizes)
+                                      weight=arrays.weight.copy(), gaps=gaps)
         self.best = copy_incumbent(start)
         self._params, self._scale = params, problem.scale
         self._goal, self._decided = problem.base.rules.objective, False

@@ -18,10 +18,10 @@ BY_DISTANCE, BY_FINISH, BY_LATENESS, FINISH_FROM, BY_EXCESS = range(5)
 NEXT, PREV, OF_UAV, HEAD = range(4)  # OF_UAV: m where a task is in no route
 # columns of TimedRoutes.way, by node: row of TimedArrays.fixed and point where it begins and ends
 ENTER, LEAVE = range(2)
-# columns of TimedRoutes.reach, by node: its longest leg [m] to a task, to another node; and the
-# longest time [s] from a departure to the latest start after that leg. -inf: there is none, inf:
-# places there are tried however far away, or however late
-INNER, OUTER, INNER_GAP, OUTER_GAP = range(4)
+# columns of TimedRoutes.reach, by node: its longest leg [m] to a task, to another node; and of
+# TimedRoutes.gap: its longest time [s] from a departure to the latest start after such a leg.
+# -inf: there is none, inf: places there are tried however far away, or however late
+INNER, OUTER = range(2)
 # columns of TimedRoutes.row, by node; LEG: to the next one, LEG_TO: from the one before, of tasks
 START, DEPARTURE, LATEST, WARP_BEFORE, WARP_AFTER, LEG, TIME, LEG_TO = range(8)
 RATE, LOAD_BEFORE, LENGTH_BEFORE, LASTED, LEFT, LASTS, EARLY, WAITS = range(8, 16)

@@ -133,9 +133,9 @@ def _within_reach(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
             if not a.gaps:
                 break
             passes = service + apart * a.least_pace
-            late = passes + apart * a.least_pace - r.reach[c, at.INNER_GAP]
+            late = passes + apart * a.least_pace - r.gap[c, at.INNER]
             inner = weight * (apart + inner) + excess_price(price, late)
-            late = passes + base_way * a.least_pace - r.reach[c, at.OUTER_GAP]
+            late = passes + base_way * a.least_pace - r.gap[c, at.OUTER]
             outer = weight * (apart + outer) + excess_price(price, late)
             if not (inner if inner < outer else outer) >= least:
                 break
@@ -239,7 +239,7 @@ def unlink(a: TimedArrays, r: TimedRoutes, t: int) -> None:
     r.route[u, at.METRES] += added
     r.sums[at.METRES] += added
     r.link[t, at.OF_UAV] = LINK(a.uavs)
-    r.reach[t, :] = -math.inf
+    r.reach[t, at.INNER] = r.reach[t, at.OUTER] = -math.inf
     if not is_task(a, t):
         return
     if not a.whole:

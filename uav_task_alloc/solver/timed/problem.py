@@ -377,7 +377,8 @@ def empty_timed_routes(a: TimedArrays) -> TimedRoutes:
         np.zeros((len(a.limit), at.TRIP_COLUMNS)),
         np.zeros((a.uavs, at.ROUTE_COLUMNS)), np.zeros(at.SUM_COLUMNS), np.zeros(2, np.int64),
         np.zeros(max(1, a.first_member.size - 1), np.int64),
-        first_ways(nodes, a.far, a.uavs), aligned_zeros(nodes, 4), a.first_member.copy())
+        first_ways(nodes, a.far, a.uavs), np.full((nodes, 2), -math.inf),
+        np.full((nodes, 2), -math.inf), a.first_member.copy())
     order = np.arange(nodes).astype(LINK)
     order[:a.uavs] += LINK(a.ends)
     set_order(a, routes, order)

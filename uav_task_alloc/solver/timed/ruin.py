@@ -28,7 +28,7 @@ from uav_task_alloc.solver.timed.insertion import (
 from uav_task_alloc.solver.timed.legs import slot_of
 from uav_task_alloc.solver.timed.places import cheapest_direction
 from uav_task_alloc.solver.timed.route_sums import cost_of
-from uav_task_alloc.solver.timed.segments import update
+from uav_task_alloc.solver.timed.segments import set_gaps, set_reach, update
 from uav_task_alloc.solver.timed.ways import has_paths, is_task
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
@@ -45,7 +45,6 @@ class Round(NamedTuple):
     node: Links  # (nodes) saved rows: their nodes
     link: Links  # (nodes, 4)
     way: Links  # (nodes, 2)
-    reach: Floats  # (nodes, 4)
     row: Floats  # (nodes, columns from START)
     uav: Ints  # (m) saved routes: their UAVs
     route: Floats  # (m, columns from WARP)
@@ -63,7 +62,7 @@ def empty_round(a: TimedArrays) -> Round:
     """An empty round with room for any."""
     nodes, m, n = node_count(a), a.uavs, a.ends - a.uavs
     return Round(np.empty(nodes, LINK), np.empty((nodes, 4), LINK), np.empty((nodes, 2), LINK),
-                 np.empty((nodes, 4)), np.empty((nodes, at.ROW_COLUMNS)), np.empty(m, np.int64),
+                 np.empty((nodes, at.ROW_COLUMNS)), np.empty(m, np.int64),
                  np.empty((m, at.ROUTE_COLUMNS)), np.empty((len(a.limit), at.TRIP_COLUMNS)),
                  np.empty(at.SUM_COLUMNS), np.empty(2, np.int64), np.empty(n + 1, LINK),
                  np.empty(n + 1), np.full(m, -1, np.int64), np.empty(n + 1, LINK),
@@ -95,7 +94,7 @@ def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
     while True:
         w.node[k] = i
         for c in range(4):
-            w.link[k, c], w.reach[k, c] = r.link[i, c], r.reach[i, c]
+            w.link[k, c] = r.link[i, c]
         if has_paths(a):
             w.way[k, 0], w.way[k, 1] = r.way[i, 0], r.way[i, 1]
         for c in range(at.RATE):
@@ -119,7 +118,7 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
     """Restore all routes that the round changed. O(their tasks)."""
     for k in range(w.counts[REMOVED]):
         r.link[w.removed[k], at.OF_UAV] = LINK(a.uavs)
-        r.reach[w.removed[k], :] = -math.inf
+        r.reach[w.removed[k], at.INNER] = r.reach[w.removed[k], at.OUTER] = -math.inf
     for k in range(w.counts[SAVED_ROUTES]):
         u = w.uav[k]
         if (r.route[u, at.TASKS] == 0.0) != (w.route[k, at.TASKS] == 0.0):
@@ -140,12 +139,14 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
             for c in range(at.RATE, at.ROW_COLUMNS):
                 r.row[i, c] = w.row[k, c]
         if is_task(a, i):
-            for c in range(4):
-                r.reach[i, c] = w.reach[k, c]
+            set_reach(a, r, i)
         elif i < a.uavs or i >= a.bases:
             slot = slot_of(a, i)
             for c in range(at.TRIP_COLUMNS):
                 r.trip[slot, c] = w.trip[slot, c]
+    if a.gaps:
+        for k in range(w.counts[SAVED_ROUTES]):
+            set_gaps(a, r, w.uav[k], a.ends + w.uav[k])
     for c in range(at.SUM_COLUMNS):
         r.sums[c] = w.sums[c]
     r.counts[0], r.counts[1] = w.routes_count[0], w.routes_count[1]

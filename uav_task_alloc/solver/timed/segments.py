@@ -20,48 +20,59 @@ from uav_task_alloc.solver.timed.ways import has_paths, is_task, service_of
 
 
 @inline_kernel
+def set_reach(a: TimedArrays, r: TimedRoutes, i: int) -> None:
+    """Set TimedRoutes.reach of node i, whose neighbours in its route are known. O(1)."""
+    inner = outer = -math.inf
+    if r.link[i, at.NEXT] < a.ends:
+        inner = r.row[i, at.LEG]
+    else:
+        outer = r.row[i, at.LEG]
+    if is_task(a, r.link[i, at.PREV]):
+        inner = max(inner, r.row[i, at.LEG_TO])
+    else:
+        outer = max(outer, r.row[i, at.LEG_TO])
+    if outer > -math.inf and (a.visits > 0 or has_paths(a)):
+        outer = math.inf  # a visit of the base may cost less than its way
+    r.reach[i, at.INNER], r.reach[i, at.OUTER] = inner, outer
+
+
+@inline_kernel
 def _gap(a: TimedArrays, r: TimedRoutes, i: int, j: int) -> float:
     """Time [s] from the departure of node i to the latest start of j after it. O(1).
 
-    inf where j is late already, where a visit of the base may change the departure, and where it
-    is not asked for.
+    inf where j is late already.
     """
-    if not a.gaps or a.visits > 0:
-        return math.inf
     departure, latest = r.row[i, at.DEPARTURE], r.row[j, at.LATEST]
     late = after_leg(a, departure, r.row[i, at.TIME], j) > latest
     return math.inf if late else float(latest - departure)
 
 
 @inline_kernel
-def _set_reach(a: TimedArrays, r: TimedRoutes, first: int, last: int) -> None:
-    """Set TimedRoutes.reach of all tasks from node `first` to node `last`. O(tasks).
+def set_gaps(a: TimedArrays, r: TimedRoutes, first: int, last: int) -> None:
+    """Set TimedRoutes.gap of all tasks from node `first` to `last` of a route. O(tasks).
 
-    What else is known of these nodes, and of those beside them, is up to date.
+    What else is known of the route is up to date.
     """
     i, before = first, r.link[first, at.PREV]
     if not is_task(a, i):
-        before, i = i, r.link[i, at.NEXT]
+        i, before = r.link[i, at.NEXT], i
     gap_before = _gap(a, r, before, i)
     while is_task(a, i):
         then = r.link[i, at.NEXT]
-        gap = _gap(a, r, i, then)
-        inner = outer = inner_gap = outer_gap = -math.inf
-        if then < a.ends:
-            inner, inner_gap = r.row[i, at.LEG], gap
+        gap_after = _gap(a, r, i, then)
+        inner = outer = -math.inf
+        if is_task(a, then):
+            inner = gap_after
         else:
-            outer, outer_gap = r.row[i, at.LEG], gap
+            outer = gap_after
         if is_task(a, before):
-            inner, inner_gap = max(inner, r.row[i, at.LEG_TO]), max(inner_gap, gap_before)
+            inner = max(inner, gap_before)
         else:
-            outer, outer_gap = max(outer, r.row[i, at.LEG_TO]), max(outer_gap, gap_before)
-        if outer > -math.inf and (a.visits > 0 or has_paths(a)):
-            outer = math.inf  # a visit of the base may cost less than its way
-        r.reach[i, at.INNER], r.reach[i, at.OUTER] = inner, outer
-        r.reach[i, at.INNER_GAP], r.reach[i, at.OUTER_GAP] = inner_gap, outer_gap
+            outer = max(outer, gap_before)
+        r.gap[i, at.INNER], r.gap[i, at.OUTER] = inner, outer
         if i == last:
             break
-        before, i, gap_before = i, then, gap
+        before, i, gap_before = i, then, gap_after
 
 
 @inline_kernel
@@ -110,9 +121,12 @@ def update_part(a: TimedArrays, r: TimedRoutes, u: int, first: int, last: int,
     Goes on from them in both directions until nothing changes. O(tasks) at worst, O(1) mostly.
     """
     to, passed, end = first, first == last, a.ends + u
+    set_reach(a, r, first)
     while to != end:
         i, to = to, r.link[to, at.NEXT]
         changed = _step_forward(a, r, u, i, to)
+        if not passed:
+            set_reach(a, r, to)
         if passed and not changed:
             break
         passed = passed or to == last
@@ -123,7 +137,8 @@ def update_part(a: TimedArrays, r: TimedRoutes, u: int, first: int, last: int,
         if passed and not changed:
             break
         passed = passed or back == first
-    _set_reach(a, r, back if a.gaps else first, to if a.gaps else last)
+    if a.gaps:
+        set_gaps(a, r, back, to)
     update_route(a, r, u, before)
 
 
@@ -159,6 +174,7 @@ def _trip_forward(a: TimedArrays, r: TimedRoutes, u: int, head: int) -> int:
         r.row[j, at.LASTED] = lasted + wait + service_of(a, r, u, j)
         r.row[j, at.LOAD_BEFORE], r.row[j, at.LENGTH_BEFORE] = load, metres
         r.link[j, at.HEAD] = head
+        set_reach(a, r, j)
         i = j
     r.trip[slot, at.CARRIED], r.trip[slot, at.FLOWN] = load, metres
     r.trip[slot, at.AIRBORNE] = lasted
@@ -226,10 +242,11 @@ def update_whole(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None:
     last = end
     while True:
         head = _trip_backward(a, r, u, last)
-        _set_reach(a, r, head, last)
         if head == u:
             break
         last = head
+    if a.gaps:
+        set_gaps(a, r, u, end)
     update_route(a, r, u, before)
 
 
