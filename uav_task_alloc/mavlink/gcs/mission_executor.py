@@ -85,18 +85,15 @@ class MissionExecutor:
         self.energy = VehicleEnergy(self.telemetry, self.onboard)
         self.events: deque[TaskProgress] = deque()
         self.notes: deque[OperatorNote] = deque()
-        self._rates = MessageRates(peer, self.telemetry, now)
-        self._end_actions = EndActions(peer, profile, self.onboard)
+        self._rates, self._event_retry = MessageRates(peer, self.telemetry, now), EventRetry()
+        self._end_actions, log = EndActions(peer, profile, self.onboard), StatusTextLog()
         self._was_stale, self._restarts = False, 0
-        self._event_retry, log = EventRetry(), StatusTextLog()
         self._messages = MissionMessages(self.onboard, self.telemetry, self.watch, self.sender,
                                          profile.atomic, log, self.notes)
         self.fence = VehicleFence(peer, profile, origin, self.telemetry, self.onboard,
                                  self.authority, lambda: self.policy, rng,
                                  fence_memory or FenceMemory())
         self.energy.read_capacity = self.fence.parameters.capacity
-        takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
-                          lambda: self.policy, self.fence.missing)
         self._end_of_list = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
                                       lambda: self.policy, self.notes, profile)
         execution = ListExecution(self.sender, self.telemetry, self.onboard, self.watch, profile,
@@ -104,18 +101,19 @@ class MissionExecutor:
         self.holds = HoldRule(self.sender, self.telemetry, self.watch, profile, self.onboard,
                               execution.update_mission, self.notes)
         restore_record(record, self.onboard, self.watch, profile)
-        progress, wanted = self.onboard.progress, self.onboard.list
+        progress = self.onboard.progress
         self._news = (progress.events, progress.passed_over, progress.uncovered, progress.skipped,
-                      wanted.failed)
-        self._notes_of_parts = (self.watch.notes, self.onboard.notes, wanted.notes,
+                      self.onboard.list.failed)
+        self._notes_of_parts = (self.watch.notes, self.onboard.notes, self.onboard.list.notes,
                                 self.sender.notes, self.fence.notes)
+        self._rules = self._in_order(execution)
+
+    def _in_order(self, execution: ListExecution) -> tuple[Callable[[float], NextMessages], ...]:
+        """The rules: the first that is not satisfied returns its messages."""
+        takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
+                          lambda: self.policy, self.fence.missing)
         transfers = MissionTransfers(self.sender, self.telemetry, self.onboard, self.authority,
                                      self._end_of_list)
-        self._rules = self._in_order(takeoff, execution, transfers)
-
-    def _in_order(self, takeoff: Takeoff, execution: ListExecution,
-                  transfers: MissionTransfers) -> tuple[Callable[[float], NextMessages], ...]:
-        """The rules: the first that is not satisfied returns its messages."""
         return (
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
             self.holds.hold, transfers.upload, transfers.read, self._has_list, transfers.resume,

@@ -13,8 +13,8 @@ from uav_task_alloc.mavlink.mission.flown_path import GAP, PositionSample
 from uav_task_alloc.model import Point
 
 _SAME = 1.0  # [m] between the ends of a closed way
-SHORTEST = 1.0  # [m] of a flown part or of a rest
-SLACK = 10.0  # [m] of positions that are not exact
+LEAST_PART = 1.0  # [m] of a flown part or of a rest
+POSITION_SLACK = 10.0  # [m] of positions that are not exact
 SPEED_MARGIN = 1.2  # factor of a speed: how far a vehicle may have flown
 _COURSE_SPEED = 1.0  # [m/s] above which a vehicle has a course
 
@@ -92,7 +92,7 @@ class Piece:
         silent = sample.t - before > GAP
         known = mission_known and not self.missed
         gap = max(sample.t - since, 0.0) if known or not silent else 0.0
-        reach = max(SPEED_MARGIN * fastest * gap - back, 0.0) + SLACK
+        reach = max(SPEED_MARGIN * fastest * gap - back, 0.0) + POSITION_SLACK
         metres = self._metres(sample.position, reach, corridor)
         if metres is not None:
             self.flown, self.seen, self.off = max(self.flown, metres), sample.t, None
@@ -116,7 +116,7 @@ class Piece:
         """
         n = bisect_right(self.way_at, self.flown)
         end = self.way_at[min(n, len(self.way) - 1)]
-        metres = self._metres(sample.position, end - self.flown + SLACK, corridor)
+        metres = self._metres(sample.position, end - self.flown + POSITION_SLACK, corridor)
         if metres is None or metres < self.flown:
             return False
         self.flown, self.seen = metres, sample.t
@@ -124,7 +124,7 @@ class Piece:
 
     def _metres(self, position: Point, reach: float, corridor: float) -> float | None:
         """Where on the way the vehicle is [m]; None where it does not follow it."""
-        low, high = self.flown - SLACK, self.flown + reach
+        low, high = self.flown - POSITION_SLACK, self.flown + reach
         first = max(bisect_right(self.way_at, low) - 1, 0)
         last = min(bisect_left(self.way_at, high), len(self.way) - 1)
         best, found = corridor, None
@@ -182,10 +182,10 @@ class Piece:
 
     def commit(self) -> bool:
         """Leave out the flown part from now on; whether there is one."""
-        if self.flown < SHORTEST:
+        if self.flown < LEAST_PART:
             self.flown, self.seen, self.off = 0.0, None, None
             return False
-        left = max(self.high - self.low - self.flown, SHORTEST)
+        left = max(self.high - self.low - self.flown, LEAST_PART)
         if self.reversed:
             self.high = self.low + left
         else:

@@ -13,7 +13,7 @@ from itertools import accumulate, pairwise
 
 from uav_task_alloc.mavlink.mission.flown_path import GAP, PositionSample
 from uav_task_alloc.mavlink.mission.item import Item
-from uav_task_alloc.mavlink.mission.piece import SHORTEST, SLACK, SPEED_MARGIN, Piece
+from uav_task_alloc.mavlink.mission.piece import LEAST_PART, POSITION_SLACK, SPEED_MARGIN, Piece
 from uav_task_alloc.mavlink.mission.piece_mark import (
     PART_FLOWN,
     PART_MISSED,
@@ -126,8 +126,8 @@ class PieceCoverage:
             vehicle is not at its first point.
         """
         piece = self._pieces.get(item.task) if item is not None and item.along else None
-        return piece is not None and piece.flown < SHORTEST and (
-            math.dist(place, piece.way[0]) > self.corridor + SLACK)
+        return piece is not None and piece.flown < LEAST_PART and (
+            math.dist(place, piece.way[0]) > self.corridor + POSITION_SLACK)
 
     def is_followed(self, stop: MissionStop) -> bool:
         """Whether the vehicle is flying along the way of a stop, in the direction of the stop."""
@@ -185,7 +185,7 @@ class PieceCoverage:
                 self._follow(piece, sample, sample.t)
             if piece.off is not None:  # it may have come to it since, or it cannot
                 since, back = piece.off
-                piece.missed = back > self.corridor + SLACK + (
+                piece.missed = back > self.corridor + POSITION_SLACK + (
                     SPEED_MARGIN * self._fastest * max(vehicle_now() - since, 0.0))
 
     def note_replaced(self, item: Item | None) -> None:
@@ -247,13 +247,13 @@ class PieceCoverage:
         if piece is None or math.isinf(self._sampled):
             return True
         left = piece.left
-        if left <= self.corridor + SLACK or piece.in_silence:
+        if left <= self.corridor + POSITION_SLACK or piece.in_silence:
             return True
         # nothing was received since it was on its way
         blind = self.mission_known and piece.seen is not None and (
             self._sampled <= piece.seen and not piece.missed and not piece.gone)
         left += piece.off[1] if piece.off is not None else 0.0
-        return blind and left <= SLACK + self.corridor + SPEED_MARGIN * fastest * max(
+        return blind and left <= POSITION_SLACK + self.corridor + SPEED_MARGIN * fastest * max(
             0.0, vehicle_now - (piece.seen or 0.0))
 
     def covered_before(self, task: str) -> bool:
@@ -267,7 +267,7 @@ class PieceCoverage:
         """
         piece = self._pieces.get(task)
         return piece is None or piece.in_silence or (
-            piece.left <= self.corridor + SLACK)
+            piece.left <= self.corridor + POSITION_SLACK)
 
     def forget(self, task: str) -> None:
         """Fly the whole way of a task again."""
@@ -345,7 +345,7 @@ class PieceCoverage:
         """
         piece = self._pieces.get(item.task) if item is not None and item.along else None
         if piece is None or item is None or self.recorded or piece.seen is not None or (
-                piece.flown >= SHORTEST or item.position is None):
+                piece.flown >= LEAST_PART or item.position is None):
             return
         place = item.position
         n = min(range(1, len(piece.way)), key=lambda k: math.dist(piece.way[k], place))
