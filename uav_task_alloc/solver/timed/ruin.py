@@ -352,7 +352,7 @@ def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, by
         if r.link[t, at.OF_UAV] != a.uavs:
             continue
         most = generous * a.unserved[t - a.uavs]
-        place, kind, cost = near_place(a, r, t, True, blinks, most, rng)
+        place, kind, cost = near_place(a, r, t, True, blinks, most if a.gaps else math.inf, rng)
         if place < 0 and uniform(rng) < ANYWHERE_RATE:
             place, kind, cost = place_anywhere(a, r, t)
         if place >= 0 and cost < most:
