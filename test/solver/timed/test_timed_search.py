@@ -352,3 +352,14 @@ def test_a_search_ends_where_locked_tasks_end_after_the_time_of_their_uav():
     work = [Task('a', (1000.0, 0.0, 0.0)), Task('b', (500.0, 0.0, 0.0))]
     found = plan(fleet, work, locked={'u': ('a',)}, budget=60.0, max_iterations=100)
     assert found.routes['u'][0] == 'a'
+
+
+def test_temperatures_follow_the_price_of_lateness_where_nothing_else_counts():
+    fleet, work = mixed_problem(15)
+    scales = []
+    for lateness in (2.0, 4.0):
+        only = Objective(distance=0.0, finish=0.0, response=0.0, lateness=lateness)
+        rules = Rules(objective=only)
+        scales.append(make_timed(make_problem(fleet, work, {}, Limits(), rules), {}).scale)
+    assert scales[0] > 1.0  # at 15 m/s the nearest tasks are some seconds away
+    assert scales[1] == pytest.approx(2.0 * scales[0])

@@ -334,7 +334,10 @@ def _fill(problem: Problem, a: TimedArrays, known: TimedProblem | None) -> float
     legs = a.near_length[some, 0] if some.any() else a.fixed[a.uavs:a.ends, at.REMOTE]
     metres = max(float(legs.mean()), 1e-6)
     goal = problem.rules.objective  # a delay on one route is a share of that of all
-    return max(1e-9, metres * (goal.distance + pace * (goal.finish + goal.response) / a.uavs))
+    cost = goal.distance + pace * (goal.finish + goal.response) / a.uavs
+    if cost == 0.0 and math.isfinite(goal.lateness):
+        cost = pace * goal.lateness
+    return max(1e-9, metres * cost)
 
 
 def _set_prices(problem: Problem, a: TimedArrays, scale: float) -> None:
