@@ -22,6 +22,13 @@ def test_a_first_trip_without_tasks_gets_one_again():
     assert result.gap < 1e-6
 
 
+def test_a_load_that_delays_the_tasks_before_it_is_taken_on_a_second_trip():
+    problem = small_problem(191339)  # a UAV without a wait; the load is there from 49.8 s on
+    result = compare_small(problem, rounds=1000)
+    assert result.faults == ()
+    assert result.gap < 1e-6
+
+
 def test_a_wrong_plan_is_noticed():
     problem = small_problem(3)
     result = problem.solve(100)

@@ -112,7 +112,21 @@ def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: fl
     cost += _trip_excess(a, r, u, t, c, slot, added, seconds, further)
     if a.timed_cost and cost < least:
         cost += cost_of_delay(a, r, u, t, start, then, arrival)
+        if a.whole and a.fixed[t, at.TRIP_RELEASE] > -math.inf:
+            cost += _cost_of_hold(a, r, t, head, then)
     return float(cost)
+
+
+@inline_kernel
+def _cost_of_hold(a: TimedArrays, r: TimedRoutes, t: int, head: int, then: int) -> float:
+    """Cost of the tasks before node `then` as the trip departs later for the load of t. O(1)."""
+    if head < a.uavs and a.begin[head, at.GROUNDED] == 0.0:
+        return 0.0
+    delay = a.fixed[t, at.TRIP_RELEASE] + r.row[head, at.LASTED] - r.row[head, at.DEPARTURE]
+    rate = r.row[head, at.RATE]
+    if r.row[head, at.WAITS] <= r.row[then, at.WAITS]:  # nobody waits between them
+        rate -= r.row[then, at.RATE]
+    return float(rate * delay) if delay > 0.0 and rate > 0.0 else 0.0
 
 
 @inline_kernel
