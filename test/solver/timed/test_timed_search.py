@@ -251,17 +251,17 @@ def test_reach_and_gaps_kept_during_search_are_those_of_the_legs(whole, gaps):
     colony.fly(0.0, 0.5, 2000)
     a, routes = colony.arrays, colony.routes
     for t in range(a.uavs, a.ends):
-        legs, gaps = [-math.inf] * 2, [-math.inf] * 2  # to tasks, to others
+        legs, times = [-math.inf] * 2, [-math.inf] * 2  # to tasks, to others
         if routes.link[t, at.OF_UAV] < a.uavs:
             for other, column in ((at.NEXT, at.LEG), (at.PREV, at.LEG_TO)):
                 node = routes.link[t, other]
                 kind = 0 if a.uavs <= node < a.ends else 1
                 i, j = (t, node) if other == at.NEXT else (node, t)
                 legs[kind] = max(legs[kind], routes.row[t, column])
-                gaps[kind] = max(gaps[kind], gap(a, routes, i, j))
+                times[kind] = max(times[kind], gap(a, routes, i, j))
         assert routes.reach[t].tolist() == legs
         if a.gaps and routes.link[t, at.OF_UAV] < a.uavs:
-            assert routes.gap[t].tolist() == gaps
+            assert routes.gap[t].tolist() == times
 
 
 @pytest.mark.parametrize('objective', ['distance', 'response', 'balanced'])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the messages of a vehicle say of its mission: position, items reached, current item."""
+"""Messages of a vehicle for its mission: position, items reached, current item, status texts."""
 from __future__ import annotations
 
 from collections import deque
@@ -17,7 +17,7 @@ from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 
 class MissionMessages:
-    """Passes them on to the progress of the mission on board.
+    """Passes messages on to the progress of the mission on board, and status texts to the rules.
 
     Args:
         onboard: the mission of the vehicle.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rules by which an upload is continued, and a mission that is not known is read."""
+"""Rules: continue an upload, read an unknown mission, complete what was flown meanwhile."""
 from __future__ import annotations
 
 from uav_task_alloc.mavlink.gcs.authority import Authority

@@ -74,7 +74,7 @@ class TimedArrays(NamedTuple):
     class_of: Ints  # (m)
     least_pace: float  # [s] of a way for each metre between its ends, at least
     least_cut: float  # [s] by which cut lengths shorten a way over two legs, at most
-    gaps: bool  # TimedRoutes.gap is kept up to date: pays where many tasks have no place
+    gaps: bool  # TimedRoutes.gap is kept, of tasks in routes: pays where many have no place
 
 
 class TimedRoutes(NamedTuple):

@@ -50,7 +50,7 @@ class TimedParams:
     least_price: float = 0.0  # of a task after the restart, over what served ones cost by value
     nearly_last: float = 3.0  # temperatures before the last end of a route from which all count
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
-    by_gaps: bool = False  # places are passed over by the times they leave, not only by legs
+    by_gaps: bool = False  # TimedArrays.gaps; so it is where tasks have prizes
     intensifies: bool = False  # where there are many tasks, also as an Intensifier does
 
 

@@ -118,14 +118,17 @@ def _with_empty_first_trip(a: TimedArrays, r: TimedRoutes, c: int) -> int:
 def _within_reach(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: float) -> int:
     """The first of these sides of neighbours of task t where a place may cost less. O(k).
 
-    Most neighbours are passed over, by what a few lines of the cache hold: their legs, and the
-    time from a departure to the latest start after it.
+    Most neighbours are passed over, by what a few lines of the cache hold: their legs and, where
+    TimedArrays.gaps asks for it, the time from a departure to the latest start after it. So may be
+    places that cost less because they end an excess.
     """
     if side & 1:
         return side
     i, k, base_way = t - a.uavs, side >> 1, a.fixed[t, at.BASE_WAY]
     weight, price = a.weight[at.BY_DISTANCE], a.price[at.WARP]
     service = a.fixed[t, at.SERVICE] - a.least_cut
+    # the other end of a leg is as far, or tried at its turn, or may not be adjacent without warp
+    twice = a.least_pace if price == math.inf else 0.0
     while k < a.near_count[i]:
         c, apart = a.near[i, k], a.near_length[i, k]
         inner, outer = apart - r.reach[c, at.INNER], base_way - r.reach[c, at.OUTER]
@@ -133,7 +136,7 @@ def _within_reach(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
             if not a.gaps:
                 break
             passes = service + apart * a.least_pace
-            late = passes + apart * a.least_pace - r.gap[c, at.INNER]
+            late = passes + apart * twice - r.gap[c, at.INNER]
             inner = weight * (apart + inner) + excess_price(price, late)
             late = passes + base_way * a.least_pace - r.gap[c, at.OUTER]
             outer = weight * (apart + outer) + excess_price(price, late)
@@ -148,7 +151,8 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
                rng: RngState) -> tuple[int, int, float]:
     """The cheapest place beside neighbours and in empty routes: (node before, kind, cost). O(k).
 
-    TURNED is part of the kind; the node is -1 where none costs less than `most`.
+    TURNED is part of the kind; the node is -1 where none costs less than `most`. A place that ends
+    an excess may be passed over.
 
     opens: empty routes are tried, too. Each place is skipped with probability `blinks`, but for
     an empty first trip.

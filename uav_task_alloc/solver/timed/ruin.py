@@ -32,7 +32,8 @@ from uav_task_alloc.solver.timed.segments import set_gaps, set_reach, update
 from uav_task_alloc.solver.timed.ways import has_paths, is_task
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
-ANYWHERE_RATE = 0.02  # share of tasks without a place among neighbours that try all routes
+# share of tasks without a place among neighbours, or without one at their price, that try all
+ANYWHERE_RATE = 0.02
 ORDERS = 15  # weights of the orders of insertion
 
 # entries of Round.counts
