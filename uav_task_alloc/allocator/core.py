@@ -173,7 +173,7 @@ class Allocator:
 
     def _check_hold(self, now: float) -> None:
         """End the hold after a restart when all awaited UAVs have reported for a while."""
-        if self.world.restart_hold and self._waiting(now):
+        if self.world.restart_hold and self.awaited(now):
             self._hold_until = now + _RESTART_HOLD
         elif self.world.restart_hold and now >= self._hold_until:
             self.world.release_hold(now)
@@ -181,7 +181,7 @@ class Allocator:
     def _check_approval(self, now: float, stamp: float) -> None:
         """Decide an open proposal whose time is over, or that needs no approval any more."""
         proposal = self.world.proposal
-        if proposal is None or not self.world.kernels_ready or self._waiting(now):
+        if proposal is None or not self.world.kernels_ready or self.awaited(now):
             return
         if self.world.params.approval == 'none':
             self.approvals.withdraw('approval is none')
@@ -216,7 +216,7 @@ class Allocator:
     def due(self, now: float, stamp: float) -> ReplanProblem | None:
         """Return the problem to solve now, if any; None while one is being solved."""
         world, schedule, params = self.world, self.schedule, self.world.params
-        if not world.kernels_ready or schedule.busy or self._waiting(now):
+        if not world.kernels_ready or schedule.busy or self.awaited(now):
             return None
         if schedule.settled(now, params.settle):
             trigger = schedule.begin(now)
@@ -232,10 +232,15 @@ class Allocator:
                                   stamp=stamp, outlook=self.waiting.outlook(stamp))
         return None
 
-    def _waiting(self, now: float) -> bool:
+    def awaited(self, now: float) -> list[str]:
+        """Return the UAVs with tasks that have not reported since a restart, while they may.
+
+        Args:
+            now: [s] steady clock.
+        """
         self._awaited = {uav_id for uav_id in self._awaited
                          if self.world.uav_record(uav_id) is None}
-        return bool(self._awaited) and now < self._wait_until
+        return sorted(self._awaited) if now < self._wait_until else []
 
     def stop_early(self, now: float, background: bool) -> bool:
         """Return whether the running solve should end now, as newer events wait for it."""

@@ -100,6 +100,9 @@ class OperatorDesk:
         why, proposal = self._core.approvals.refusal(revision), self._world.proposal
         if why or proposal is None:
             return OrderAnswer(False, f'refused: {why}')
+        if accept and (silent := self._core.awaited(now)):  # a list needs the place of its UAV
+            return refused(f'after the restart {first_of(silent)} have not reported yet: try '
+                           'again when they have')
         word = 'accepted' if accept else 'rejected'
         text = f'plan {revision} {word}: {first_of(proposal.changes, separator="; ")}'
         price = (proposal.distance, proposal.finish, proposal.late) if accept else (0.0, 0.0, ())

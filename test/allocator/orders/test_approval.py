@@ -169,6 +169,28 @@ def test_an_open_proposal_outlives_a_restart_and_is_applied_once(driver):
     assert restored_state(again.core.rows()).proposal is None
 
 
+def test_a_proposal_is_not_accepted_before_its_uavs_have_reported(driver):
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    driver.core.nothing_written()
+    again = AllocatorDriver(restored_state(driver.core.rows()), plan, approval='replan',
+                            uav_timeout=5.0)
+    revision = again.world.proposal.revision
+
+    def approve():
+        return again.desk().approve(revision, True, 'ann', False, again.now, again.now)
+
+    early = approve()
+    assert (early.success, early.message) == (
+        False, 'refused: after the restart a, b have not reported yet: try again when they have')
+    again.uav('a', 0.0, 0.0, 50.0)
+    again.uav('b', 1000.0, 0.0, 50.0)
+    again.settle()
+    assert approve().success
+    again.settle()
+    assert again.route('a') == ('t1', 't2', 't4')
+
+
 def test_without_approval_an_open_proposal_goes_out(driver):
     driver.add(('t4', 300, 0))
     driver.settle()
