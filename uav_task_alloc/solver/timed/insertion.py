@@ -127,8 +127,8 @@ def _within_reach(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
     i, k, base_way = t - a.uavs, side >> 1, a.fixed[t, at.BASE_WAY]
     weight, price = a.weight[at.BY_DISTANCE], a.price[at.WARP]
     service = a.fixed[t, at.SERVICE] - a.least_cut
-    # the other end of a leg is as far, or tried at its turn, or may not be adjacent without warp
-    twice = a.least_pace if price == math.inf else 0.0
+    # of a leg's other end: as far, or tried at its turn, or one that needs warp to be adjacent
+    pace_to_other = a.least_pace if price == math.inf else 0.0
     while k < a.near_count[i]:
         c, apart = a.near[i, k], a.near_length[i, k]
         inner, outer = apart - r.reach[c, at.INNER], base_way - r.reach[c, at.OUTER]
@@ -136,7 +136,7 @@ def _within_reach(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
             if not a.gaps:
                 break
             passes = service + apart * a.least_pace
-            late = passes + apart * twice - r.gap[c, at.INNER]
+            late = passes + apart * pace_to_other - r.gap[c, at.INNER]
             inner = weight * (apart + inner) + excess_price(price, late)
             late = passes + base_way * a.least_pace - r.gap[c, at.OUTER]
             outer = weight * (apart + outer) + excess_price(price, late)
