@@ -22,7 +22,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import ListStop
+from uav_task_alloc.allocator.list_records import ListStop
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.model import Leg, Task

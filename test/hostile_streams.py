@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.telemetry import WANTED
+from uav_task_alloc.mavlink.gcs.telemetry_messages import WANTED
 from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.sim.modes import px4_mode
 

@@ -72,6 +72,8 @@ LEVELS = {
     'allocator.order_records': 3,
     'allocator.work_records': 3,
     'allocator.records': 3,
+    'allocator.list_records': 3,
+    'allocator.replan_records': 3,
     'allocator.state': 4,
     'allocator.replanning': 5,
     'allocator.persistence': 6,

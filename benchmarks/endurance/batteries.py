@@ -27,13 +27,13 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from uav_task_alloc.allocator import Allocator
+from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
     TaskEvent,
     TaskEventKind,
     TaskState,
-    UavList,
     UavReport,
 )
 from uav_task_alloc.allocator.replanning import planning

@@ -28,11 +28,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from deadline_motion import HEIGHT, SPEED, along, leg_seconds, over_ground, travel_seconds
 
 from uav_task_alloc.allocator import Allocator
+from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
     TaskEvent,
     TaskEventKind,
-    UavList,
     UavReport,
 )
 from uav_task_alloc.allocator.replanning import planning

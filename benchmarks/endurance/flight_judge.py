@@ -9,7 +9,7 @@ from flight_evidence import DeliveredEvidence
 from flight_world import BRIDGE, World
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic, mode_class
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.sim.config import TruthEvent

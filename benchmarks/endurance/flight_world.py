@@ -8,7 +8,7 @@ import random
 from collections.abc import Iterator
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.status import UavStatus, state_of

@@ -37,7 +37,8 @@ from flight_ways import WayJudge, random_ways
 from flight_world import World
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.authority import Authority, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority import Authority
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task

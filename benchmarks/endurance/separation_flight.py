@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from uav_task_alloc.allocator.records import ListStop, TaskEventKind, UavList, UavReport
+from uav_task_alloc.allocator.list_records import ListStop, UavList
+from uav_task_alloc.allocator.records import TaskEventKind, UavReport
 from uav_task_alloc.model import Leg as PlannedLeg, Point
 
 ACCELERATION, CLIMB, DESCENT = 3.0, 2.5, 1.5  # [m/s2], [m/s], [m/s]

@@ -27,15 +27,15 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from uav_task_alloc.allocator import Allocator
+from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
-    FleetOutlook,
     TaskEvent,
     TaskEventKind,
-    UavList,
     UavReport,
 )
+from uav_task_alloc.allocator.replan_records import FleetOutlook
 from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.allocator.replanning.waiting_places import WaitingPlaces
 from uav_task_alloc.model import Point, Task

@@ -9,7 +9,8 @@ from flight_bench import FlightBench, Store
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState, Suspension
+from uav_task_alloc.mavlink.gcs.authority import Suspension
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
 from uav_task_alloc.sim.modes import px4_mode
 

@@ -8,7 +8,7 @@ from mission_bench import ORIGIN, OURS, Line, make_vehicle, task_list
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.status import state_of
-from uav_task_alloc.mavlink.gcs.telemetry import WANTED
+from uav_task_alloc.mavlink.gcs.telemetry_messages import WANTED
 from uav_task_alloc.mavlink.transport.codec import Codec
 
 

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'benchmarks' / 'end
 from flight_judge import OURS, Judge
 from flights import Flight
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.progress import ProgressTable

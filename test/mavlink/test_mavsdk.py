@@ -17,7 +17,7 @@ from piece_bench import list_of, piece, strip
 from uav_task_alloc.actions import Action
 from uav_task_alloc.geometry.frames import to_geodetic
 from uav_task_alloc.mavlink.autopilots import PX4
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
 from uav_task_alloc.mavlink.gcs.status import UavMode, state_of

@@ -4,7 +4,8 @@ import pytest
 from test_allocator import Fleet, add, begin, task
 
 from uav_task_alloc.allocator.core import make_safe_paths
-from uav_task_alloc.allocator.records import Outbox, SavedState, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import Outbox, SavedState
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import ListStop
+from uav_task_alloc.allocator.list_records import ListStop
 from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.mavlink.transport.link import MAX_UNCONFIRMED
 from uav_task_alloc.model import Leg, Task

@@ -11,14 +11,8 @@ from picture_checks import check_markers, check_path, points, texts
 from uav_task_alloc_msgs import msg as m
 from visualization_msgs.msg import Marker, MarkerArray
 
-from uav_task_alloc.allocator.records import (
-    ListStop,
-    Outbox,
-    TaskRecord,
-    TaskState,
-    UavList,
-    UavReport,
-)
+from uav_task_alloc.allocator.list_records import ListStop, UavList
+from uav_task_alloc.allocator.records import Outbox, TaskRecord, TaskState, UavReport
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.geometry.zones import inside
 from uav_task_alloc.model import Leg, Task, ThreatZone

@@ -12,7 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import HandOver
 
-from uav_task_alloc.allocator.records import ListStop
+from uav_task_alloc.allocator.list_records import ListStop
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Task, ThreatZone
 from uav_task_alloc.nodes.conversions.messages import (

@@ -6,7 +6,7 @@ import math
 import pytest
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import ListStop
+from uav_task_alloc.allocator.list_records import ListStop
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Task, ThreatZone

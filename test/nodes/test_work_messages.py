@@ -8,7 +8,8 @@ from geometry_msgs.msg import Point
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.actions import Action
-from uav_task_alloc.allocator.records import ListStop, TaskState
+from uav_task_alloc.allocator.list_records import ListStop
+from uav_task_alloc.allocator.records import TaskState
 from uav_task_alloc.allocator.status import TaskStatus
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore
 from uav_task_alloc.mavlink.gcs.fence_store import FenceFileStore
 from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore

@@ -9,11 +9,8 @@ import pytest
 from uav_task_alloc import Separation
 from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.separation.conflicts import find_conflicts
-from uav_task_alloc.separation.resolution import (
-    TransitLimits,
-    flight_seconds,
-    resolve,
-)
+from uav_task_alloc.separation.leg_changes import TransitLimits
+from uav_task_alloc.separation.resolution import flight_seconds, resolve
 from uav_task_alloc.separation.volumes import Flight, FlightLeg, flight_volumes, leg_times
 
 RULE = Separation(10.0, 5.0, 2.0)

@@ -9,7 +9,7 @@ from sitl_bench import Bridge, SecondStation, Visits, interferes, stops
 from worlds import HOMES, SYSTEMS
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
 

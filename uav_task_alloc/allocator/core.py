@@ -11,15 +11,10 @@ from dataclasses import replace
 from functools import partial
 
 from uav_task_alloc.allocator.battery_watch import BatteryWatch
+from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.persistence import unsaved_rows
-from uav_task_alloc.allocator.records import (
-    Allocation,
-    Outbox,
-    ReplanAnswer,
-    ReplanProblem,
-    SavedState,
-    UavList,
-)
+from uav_task_alloc.allocator.records import Allocation, Outbox, SavedState
+from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning.battery_changes import BatteryChanges
 from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.learned_state import learned_state

@@ -1,31 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values of the allocator: tasks, UAV reports, task lists, problems, plans; SI units, ENU."""
+"""Values of the allocator: tasks, UAV reports, allocations, proposals; SI units, ENU."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.order_records import OperatorHold, OrderRows
 from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
-from uav_task_alloc.objective import Objective
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from uav_task_alloc.model import Plan, Point, Task, ThreatZone
 
 # limits of a UavReport that are None where they are unknown, named as in model.Uav
 REPORTED_LIMITS = ('endurance', 'payload_capacity', 'climb_speed', 'descent_speed', 'full_range',
               'turnaround')
-
-
-# task ids of each trip after the present one, by UAV id
-LaterTrips = dict[str, tuple[tuple[str, ...], ...]]
 
 
 class TaskState(Enum):
@@ -170,139 +161,6 @@ class UavReport:
                 most = 1e6 if name == 'payload_capacity' else math.inf  # as model.Uav
                 check_number(place + name, getattr(self, name), 0.0, most, open_low=True)
         put(self, 'capabilities', check_names(place + 'capabilities', self.capabilities))
-
-
-@dataclass(frozen=True, slots=True)
-class ListStop:
-    """A task in a list, the leg to it, and the estimated arrival."""
-
-    task: Task  # with its position and service time
-    leg: Leg  # from the stop before, with its detour points
-    eta: float  # [s] from the stamp of the list to the arrival
-    wait: float = 0.0  # [s] from the arrival to the start of the service
-    served: float = 0.0  # [s] of the service that are over at the stamp
-    begin_after: float = 0.0  # [s] ROS clock: the service waits until then, for the separation
-    reversed: bool = False  # the path of the task is flown from its last point
-    path_time: float = 0.0  # [s] that its path still takes
-
-    @property
-    def way(self) -> tuple[Point, ...]:
-        """What is flown at the stop [m] ENU, in order: the path of the task, or its position."""
-        path = self.task.path or (self.task.position,)
-        return path[::-1] if self.reversed else path
-
-    @property
-    def entry(self) -> Point:
-        """Where the leg to it ends [m] ENU."""
-        return self.way[0]
-
-    @property
-    def exit(self) -> Point:
-        """Where the next leg begins [m] ENU."""
-        return self.way[-1]
-
-    @property
-    def line(self) -> tuple[Point, ...]:
-        """Detour points of the leg, and the way [m] ENU."""
-        return *self.leg.via, *self.way
-
-    @property
-    def through(self) -> Leg:
-        """The leg to its exit, with the points of its way as detour points."""
-        return Leg(self.line[:-1], self.length)
-
-    @property
-    def length(self) -> float:
-        """Length of the leg and of the path [m]."""
-        return self.leg.length + self.task.path_length
-
-    @property
-    def start(self) -> float:
-        """Start of the service [s] from the stamp of the list; negative once it has begun."""
-        return self.eta + self.wait - self.served
-
-    @property
-    def finish(self) -> float:
-        """End of the service [s] from the stamp of the list."""
-        service = max(0.0, self.task.stay - self.served)
-        return self.eta + self.wait + self.path_time + service
-
-
-@dataclass(frozen=True, slots=True)
-class UavList:
-    """The tasks one UAV has still to fly, in order."""
-
-    uav: str  # id
-    revision: int  # strictly increasing
-    stops: tuple[ListStop, ...] = ()  # in the order of flight
-    returns: bool = False  # returns home after the last task
-    # [m] ENU, flown before the return home; of an empty list that holds to its waiting place
-    end_via: tuple[Point, ...] = ()
-    distance: float = 0.0  # [m] of all legs and paths, with the leg home where it returns
-    stamp: float = 0.0  # [s] of the plan
-
-    @property
-    def task_ids(self) -> tuple[str, ...]:
-        """The task ids in the order flown."""
-        return tuple(stop.task.id for stop in self.stops)
-
-    @property
-    def waiting_place(self) -> Point | None:
-        """Where the UAV waits for tasks [m] ENU; None: it has tasks, returns, or stays."""
-        return self.end_via[-1] if self.end_via and not (self.stops or self.returns) else None
-
-    def same_route(self, other: UavList) -> bool:
-        """Whether tasks, detour points, waits and end are equal: there is nothing to publish.
-
-        Args:
-            other: list of the same UAV.
-        """
-        return (self.returns, self.end_via) == (other.returns, other.end_via) and [
-            (stop.task, stop.leg.via, stop.begin_after, stop.reversed) for stop in self.stops] == [
-            (stop.task, stop.leg.via, stop.begin_after, stop.reversed) for stop in other.stops]
-
-
-@dataclass(frozen=True, slots=True)
-class ReplanProblem:
-    """A snapshot of the world for the worker; the world goes on while it is solved."""
-
-    version: int  # of the world when it was copied
-    trigger: str  # what asked for the plan
-    background: bool  # without an event: only what is better by the margin is published
-    budget: float  # [s]
-    uavs: tuple[Uav, ...]  # usable
-    tasks: tuple[Task, ...]  # open
-    zones: tuple[ThreatZone, ...]  # in force
-    locked: Mapping[str, tuple[str, ...]]  # by UAV: first tasks of its route
-    published: Plan  # the lists in force
-    warm: Plan  # the best plan so far, from which the search continues
-    objective: Objective = field(default_factory=Objective)  # what is minimised
-    trips: int = 1  # of a UAV
-    stamp: float = 0.0  # [s] of the copy, of the published clock
-    since: Mapping[str, float] = field(default_factory=dict)  # [s] announcements, by task id
-    stop_time: float = 0.0  # [s] that braking and accelerating cost at each task
-    outlook: FleetOutlook | None = None  # None: the next tasks do not count
-
-
-@dataclass(frozen=True, slots=True)
-class FleetOutlook:
-    """Where the next task is expected, at k places, and where UAVs without tasks wait for it."""
-
-    x: NDArray[np.float64]  # (k) [m] east
-    y: NDArray[np.float64]  # (k) [m] north
-    weight: NDArray[np.float64]  # (k) probability of the task, times its value; the sum is 1
-    value: float  # mean value of a task, > 0
-    waiting: Mapping[str, Point]  # [m] ENU by UAV id; of others their positions
-
-
-@dataclass(frozen=True, slots=True)
-class ReplanAnswer:
-    """Result of the worker."""
-
-    problem: ReplanProblem  # that was solved
-    repaired: Plan  # the published lists, repaired by insertion
-    best: Plan  # the best plan within the budget
-    covered: Plan | None = None  # the plan to publish, where the next tasks count
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,8 @@ from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 from uav_task_alloc.allocator import Allocator
 from uav_task_alloc.allocator.leader import Role
 from uav_task_alloc.allocator.persistence.persistence import Persistence
-from uav_task_alloc.allocator.records import LogNote, ReplanAnswer, ReplanProblem, TaskVerdict
+from uav_task_alloc.allocator.records import LogNote, TaskVerdict
+from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.allocator.replanning.worker import Worker
 from uav_task_alloc.allocator.state.ground import read_ground

@@ -22,7 +22,7 @@ from uav_task_alloc.mavlink.gcs.ground_station import GroundStation, VehicleSess
 from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.status import PublishedStates, state_of
-from uav_task_alloc.mavlink.gcs.telemetry import WANTED
+from uav_task_alloc.mavlink.gcs.telemetry_messages import WANTED
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.transport.connections import Address, Connections
 from uav_task_alloc.mavlink.transport.heartbeat import Heartbeat
@@ -34,12 +34,7 @@ from uav_task_alloc.nodes.conversions.message_limits import cut
 from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.bridge_diagnostics import BridgeDiagnostics
 from uav_task_alloc.nodes.ros.bridge_shutdown import BridgeShutdown, held_for_upload
-from uav_task_alloc.nodes.ros.clock_watch import (
-    is_simulated,
-    ros_time,
-    steady_clock,
-    watch_clock,
-)
+from uav_task_alloc.nodes.ros.clock_watch import is_simulated, ros_time, steady_clock, watch_clock
 from uav_task_alloc.nodes.ros.hold_inputs import HoldInputs
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.origin_check import OriginCheck

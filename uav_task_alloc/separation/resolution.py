@@ -8,18 +8,18 @@ conflict stays as it is, and so does each leg under way.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from uav_task_alloc.geometry.polyline import segment_distance
-from uav_task_alloc.model import Point
-from uav_task_alloc.separation.conflicts import (
-    AcceptedRows,
-    FoundConflict,
-    find_conflicts,
+from uav_task_alloc.separation.conflicts import AcceptedRows, FoundConflict, find_conflicts
+from uav_task_alloc.separation.leg_changes import (
+    LegChange,
+    TransitLimits,
+    keeps_deadlines,
+    other_heights,
+    with_wait,
 )
 from uav_task_alloc.separation.rule import Conflict, Separation
-from uav_task_alloc.separation.transit_paths import slanted, upright
 from uav_task_alloc.separation.volumes import (
     Flight,
     FlightLeg,
@@ -34,36 +34,13 @@ from uav_task_alloc.separation.volumes import (
 )
 
 STOPPED = 'no change was found in time'
-_LAYERS = 10  # above the ends of a leg, at most
 _HOLDS = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0)  # [s] in the air
 _TAKE_OFFS = tuple(5.0 * k for k in range(1, 181))  # [s] that a UAV may wait on the ground
 _MOST_PATHS = 4  # the cheapest, with which waits are combined
-_PRICE = 0.15  # [s/m] of a climb above the ends of a leg, whose power a wait does not take
-_MARGIN = 0.5  # [m] more between layers than the vertical distance: heights are kept nearly
 _LEAST_SAVED = 3.0  # [s] of a wait; for less it stays as it is
 _SOONER = (0.0, 0.25, 0.5, 0.75)  # of a wait of an earlier plan
 _GROUND = 0.5  # price of a second of waiting on the ground
-_ON_LINE = 0.01  # [m] a detour point so near to the line of its neighbours only changes the height
 LegIndex = tuple[int, int]  # of a flight, and of its leg
-
-
-@dataclass(frozen=True, slots=True)
-class TransitLimits:
-    """Where transit legs may go.
-
-    Attributes:
-        altitude_min, altitude_max: [m] ENU.
-        is_clear: whether a polyline [m] ENU enters no zone.
-        stop: polled before each change that is tried; True ends the search for changes.
-        max_price: [s] of flight that the change of a return that cannot wait may cost; changes
-            that cost more are left to the flight, where less is uncertain.
-    """
-
-    altitude_min: float = -math.inf  # [m]
-    altitude_max: float = math.inf  # [m]
-    is_clear: Callable[[Sequence[Point]], bool] = lambda points: True
-    stop: Callable[[], bool] = lambda: False
-    max_price: float = math.inf  # [s]
 
 
 @dataclass(slots=True)
@@ -118,22 +95,12 @@ def resolve(flights: Sequence[Flight], rule: Separation,
     return Resolution(after, tuple(explained), left)
 
 
-@dataclass(frozen=True, slots=True)
-class _Change:
-    """A leg as it could be flown, and its price."""
-
-    leg: FlightLeg
-    seconds: float  # price: more than as planned, with the wait and for a climb
-    text: str
-    kind: str  # `height`, `hold` or ''
-
-
 class _Planner:
     """Plans flights one after another, each apart from those accepted."""
 
     def __init__(self, flights: Sequence[Flight], rule: Separation,
                  limits: TransitLimits) -> None:
-        self.flights, self.changes = list(flights), dict[LegIndex, _Change]()
+        self.flights, self.changes = list(flights), dict[LegIndex, LegChange]()
         self.stopped = False  # changes that might help were not tried
         self._rule, self._limits = rule, limits
         self._accepted = AcceptedRows(rule)
@@ -174,7 +141,7 @@ class _Planner:
             return []
         return end_rows(flight, self._rule, end, last.points[-1] if last else flight.position)
 
-    def _changed(self, flight: Flight, k: int, n: int, ready: float) -> _Change | None:
+    def _changed(self, flight: Flight, k: int, n: int, ready: float) -> LegChange | None:
         """The cheapest change with which the leg is apart; None: there is none."""
         leg = flight.legs[n]
         planned = leg_times(flight, leg, ready, n == 0)
@@ -193,14 +160,14 @@ class _Planner:
         return self._cheapest(flight, k, n, ready, math.inf, whole=False)
 
     def _cheapest(self, flight: Flight, k: int, n: int, ready: float, max_price: float,
-                  whole: bool = True) -> _Change | None:
+                  whole: bool = True) -> LegChange | None:
         """The cheapest change that costs at most so many seconds of flight; None: there is none.
 
         Where not `whole`, the return after it does not count.
         """
         leg = flight.legs[n]
         planned = leg_times(flight, leg, ready, n == 0)
-        paths = sorted((_Change(leg, 0.0, '', ''), *self._heights(flight, leg)),
+        paths = sorted((LegChange(leg, 0.0, '', ''), *self._heights(flight, leg)),
                        key=lambda each: each.seconds)
         waits = _TAKE_OFFS if leg.takes_off else _HOLDS
         if not leg.may_wait or (n == 0 and flight.in_air and not flight.waits):
@@ -214,14 +181,14 @@ class _Planner:
                 break
             if paths[number].seconds + (0.0 if leg.takes_off else wait) > max_price:
                 continue
-            option = _with_wait(paths[number], planned.begin, wait)
+            option = with_wait(paths[number], planned.begin, wait)
             times = leg_times(flight, option.leg, ready, n == 0)
             if option.kind and self._is_apart(flight, k, n, option.leg, times, whole) and (
-                    _keeps_deadlines(flight, n, times.end - planned.end, planned.end)):
+                    keeps_deadlines(flight, n, times.end - planned.end, planned.end)):
                 return option
         return None
 
-    def _sooner(self, flight: Flight, k: int, n: int, ready: float) -> _Change:
+    def _sooner(self, flight: Flight, k: int, n: int, ready: float) -> LegChange:
         """A leg that is apart, with less height or wait of an earlier plan, if that is enough."""
         leg = flight.legs[n]
         lower = self._lower(flight, k, n, ready)
@@ -236,10 +203,10 @@ class _Planner:
             sooner = replace(leg, hold_until=begin + wait if wait else -math.inf)
             times = leg_times(flight, sooner, ready, n == 0)
             if self._is_apart(flight, k, n, sooner, times):
-                return _Change(sooner, wait, f'waits {wait:.0f} s only', 'hold')
-        return _Change(leg, 0.0, '', '')
+                return LegChange(sooner, wait, f'waits {wait:.0f} s only', 'hold')
+        return LegChange(leg, 0.0, '', '')
 
-    def _lower(self, flight: Flight, k: int, n: int, ready: float) -> _Change | None:
+    def _lower(self, flight: Flight, k: int, n: int, ready: float) -> LegChange | None:
         """A return at less height than an earlier plan gave it; None: it stays as it is."""
         leg = flight.legs[n]
         if not _returns_higher(leg):
@@ -269,39 +236,8 @@ class _Planner:
         return any(self._is_apart(flight, k, n + 1, each, leg_times(flight, each, times.end))
                    for each in (after, *(change.leg for change in heights)))
 
-    def _heights(self, flight: Flight, leg: FlightLeg) -> Iterator[_Change]:
-        """The leg at other transit heights that it may have."""
-        points, limits = self._level_points(leg), self._limits
-        planned = flight.leg_seconds(leg)
-        ends = [height for height, on_ground in (
-            (max(points[0][2], leg.top), leg.takes_off and leg.top == -math.inf),
-            (points[-1][2], leg.lands)) if not on_ground]
-        ends = ends or [max(point[2] for point in points)]
-        levels = {max(ends), min(ends), *(
-            max(ends) + step * (self._rule.vertical + _MARGIN) for step in range(1, _LAYERS + 1))}
-        for level in levels:
-            if not limits.altitude_min <= level <= limits.altitude_max:
-                continue
-            for path in {slanted(flight, leg, points, level), upright(leg, points, level)}:
-                new = replace(leg, points=path)
-                if path != leg.points and limits.is_clear(new.flown()):
-                    price = flight.leg_seconds(new) - planned + _PRICE * max(
-                        0.0, level - max(ends))
-                    if leg.may_wait or price <= limits.max_price:
-                        yield _Change(new, price, f'flies at {level:.1f} m', 'height')
-
-    def _level_points(self, leg: FlightLeg) -> tuple[Point, ...]:
-        """Points of a leg without those that only change its height."""
-        points = list(leg.points)
-        k = 1
-        while k < len(points) - 1:
-            a, point, b = (each[:2] for each in points[k - 1:k + 2])
-            if segment_distance(point, a, b) <= _ON_LINE and self._limits.is_clear(
-                    (points[k - 1], points[k + 1])):
-                del points[k]
-            else:
-                k += 1
-        return tuple(points)
+    def _heights(self, flight: Flight, leg: FlightLeg) -> Iterator[LegChange]:
+        return other_heights(flight, leg, self._rule, self._limits)
 
 
 def _climbed_rows(flight: Flight, rows: Sequence[PieceRow]) -> int:
@@ -311,28 +247,6 @@ def _climbed_rows(flight: Flight, rows: Sequence[PieceRow]) -> int:
         return 0
     end = rows[0][0] + flight.parts(leg, True)[0][0] if rows else 0.0
     return sum(row[1] <= end + 1e-6 for row in rows)
-
-
-def _with_wait(path: _Change, begin: float, wait: float) -> _Change:
-    """A change with a wait [s] before the leg, which would begin at `begin`."""
-    if wait == 0.0:
-        return path
-    return _Change(replace(path.leg, hold_until=begin + wait), path.seconds + wait, ' and '.join(
-        filter(None, (path.text, f'waits {wait:g} s'))), path.kind or 'hold')
-
-
-def _keeps_deadlines(flight: Flight, n: int, delay: float, ready: float) -> bool:
-    """Whether no service that was to begin in time begins too late after a delay of leg n [s]."""
-    if delay <= 0.0:
-        return True
-    leg, later = flight.legs[n], ready + delay
-    if ready - leg.service <= leg.latest < later - leg.service:
-        return False
-    for leg in flight.legs[n + 1:]:
-        ready, later = leg_times(flight, leg, ready).end, leg_times(flight, leg, later).end
-        if ready - leg.service <= leg.latest < later - leg.service:
-            return False
-    return True
 
 
 def _returns_higher(leg: FlightLeg) -> bool:

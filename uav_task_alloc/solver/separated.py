@@ -17,7 +17,8 @@ from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import Leg, Plan, Task, Uav, turned_tasks
 from uav_task_alloc.objective import Objective, excess, fit, response_time
 from uav_task_alloc.separation.conflicts import load_separation_kernels
-from uav_task_alloc.separation.resolution import Resolution, TransitLimits, resolve
+from uav_task_alloc.separation.leg_changes import TransitLimits
+from uav_task_alloc.separation.resolution import Resolution, resolve
 from uav_task_alloc.separation.rule import Conflict, Separation
 from uav_task_alloc.separation.volumes import (
     Flight,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from allocation import AllocatorDriver, as_plan
 
-from uav_task_alloc.allocator.records import ReplanAnswer
+from uav_task_alloc.allocator.replan_records import ReplanAnswer
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan, exchange_groups
 
 

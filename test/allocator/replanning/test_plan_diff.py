@@ -2,7 +2,7 @@
 """What counts as changed by a re-plan, and what does not."""
 import pytest
 
-from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.plan_diff import changed_tasks
 from uav_task_alloc.model import Leg, Task
 

@@ -7,7 +7,7 @@ import pytest
 from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.core import make_safe_paths
-from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.separated_lists import planned_flights
 from uav_task_alloc.allocator.replanning.task_lists import build_task_list

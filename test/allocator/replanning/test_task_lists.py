@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.task_lists import build_task_list, planned_legs
 from uav_task_alloc.model import Leg, Plan, Task, Uav
 

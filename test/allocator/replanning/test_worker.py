@@ -4,7 +4,7 @@ from queue import Queue
 
 from allocation import greedy
 
-from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem
+from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning.worker import Worker
 from uav_task_alloc.allocator.warm_up import compile_kernels
 from uav_task_alloc.model import Plan

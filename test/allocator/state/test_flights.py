@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from allocation import AllocatorDriver
 
-from uav_task_alloc.allocator.records import ListStop
+from uav_task_alloc.allocator.list_records import ListStop
 from uav_task_alloc.allocator.state.flight_pace import (
     FlightPace,
     UavFlight,

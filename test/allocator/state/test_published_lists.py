@@ -7,7 +7,9 @@ import pytest
 from allocation import AllocatorDriver, as_plan, greedy, task
 
 from uav_task_alloc import plan
-from uav_task_alloc.allocator.records import AnnouncementAction, ListStop, ReplanAnswer, UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
+from uav_task_alloc.allocator.records import AnnouncementAction
+from uav_task_alloc.allocator.replan_records import ReplanAnswer
 from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan, exchange_groups
 from uav_task_alloc.geometry.zones import path_is_clear

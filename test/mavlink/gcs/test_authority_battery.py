@@ -7,7 +7,7 @@ from authority_bench import MODES, AuthorityBench, set_mode
 from flight_bench import FlightBench
 from mission_bench import task_list
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 

@@ -13,7 +13,7 @@ from dataclasses import fields, replace
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState, TaskMark
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState, TaskMark
 from uav_task_alloc.mavlink.gcs.authority_store import (
     LONG_AGO,
     AuthorityFileStore,

@@ -13,13 +13,12 @@ from uav_task_alloc.mavlink.gcs.authority import (
     PERMISSIONS,
     Authority,
     AuthorityEvent,
-    AuthorityRecord,
-    AuthorityState,
     HoldStage,
     SendAction,
     Suspension,
     table_text,
 )
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.send_gate import action_of, allowed_messages
 
 E = AuthorityEvent

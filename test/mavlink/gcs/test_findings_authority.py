@@ -19,7 +19,7 @@ from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.model import Shape, ThreatZone
 
 AROUND_HOME = ThreatZone('Z', Shape.CYLINDER, (0.0, 10.0, 0.0), 30.0)

@@ -4,7 +4,7 @@ import pytest
 from flight_bench import FlightBench, Store, places
 from mission_bench import task_list
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
 

@@ -9,7 +9,7 @@ from findings_bench import drop_messages, listed
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.status import UavMode

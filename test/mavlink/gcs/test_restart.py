@@ -11,7 +11,7 @@ from findings_bench import distance, drop_messages, flown_once_each
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.status import UavMode
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task

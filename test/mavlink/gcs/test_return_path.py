@@ -7,7 +7,7 @@ from flight_bench import FlightBench
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.status import UavMode
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 

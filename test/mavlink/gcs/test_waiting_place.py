@@ -9,7 +9,7 @@ from mission_bench import ORIGIN, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ARDUPILOT, ARDUPLANE, PX4, PX4_PLANE
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.status import UavMode
 from uav_task_alloc.mavlink.mission.items import mission_items
 from uav_task_alloc.mavlink.mission.task_list import TaskList

@@ -8,7 +8,7 @@ from flight_bench import places
 from mission_bench import task_list
 from test_findings_uploads import AT_A, confirm, upload_during
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.mission.reports_during_upload import ReportsDuringUpload
 
 

@@ -15,7 +15,7 @@ from uav_task_alloc.mavlink.gcs.energy_estimate import NominalEnergy
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.status import PublishedStates, state_of
-from uav_task_alloc.mavlink.gcs.telemetry import WANTED
+from uav_task_alloc.mavlink.gcs.telemetry_messages import WANTED
 from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.transport.codec import Codec, make_signing

@@ -10,15 +10,9 @@ from enum import Enum
 from typing import Any, TypeVar
 
 from uav_task_alloc.actions import Action
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.persistence.order_rows import restore_order_row
-from uav_task_alloc.allocator.records import (
-    ListStop,
-    Proposal,
-    SavedState,
-    TaskRecord,
-    TaskState,
-    UavList,
-)
+from uav_task_alloc.allocator.records import Proposal, SavedState, TaskRecord, TaskState
 from uav_task_alloc.allocator.state.seen_tasks import restored_block
 from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point, check_ros_name

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem
+from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.plan_acceptance import (
     TaskIdsByUav,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
-from uav_task_alloc.allocator.records import ReplanProblem
+from uav_task_alloc.allocator.replan_records import ReplanProblem
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import OBJECTIVES, Objective
 from uav_task_alloc.params import AllocatorParams

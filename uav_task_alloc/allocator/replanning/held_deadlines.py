@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from uav_task_alloc.allocator.records import ReplanProblem, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.replan_records import ReplanProblem
 from uav_task_alloc.allocator.replanning.plan_acceptance import exchange_groups
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan, Task

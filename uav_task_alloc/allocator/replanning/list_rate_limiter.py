@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 
-from uav_task_alloc.allocator.records import UavList
+from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.replanning.plan_acceptance import exchange_groups
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem
+from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.model import Plan
 from uav_task_alloc.objective import response_time
 from uav_task_alloc.timetable import Timetable

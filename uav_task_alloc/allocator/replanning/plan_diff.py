@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from uav_task_alloc.allocator.records import UavList
+from uav_task_alloc.allocator.list_records import UavList
 
 _Place = tuple[str, str]  # the UAV of a task, and the task before it; '' for the first
 

@@ -7,13 +7,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from uav_task_alloc.allocator.records import (
-    FleetOutlook,
-    LaterTrips,
-    ReplanAnswer,
-    ReplanProblem,
-    UavList,
-)
+from uav_task_alloc.allocator.list_records import LaterTrips, UavList
+from uav_task_alloc.allocator.replan_records import FleetOutlook, ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning.from_now import (
     counts_time,
     from_now,
@@ -27,11 +22,7 @@ from uav_task_alloc.allocator.replanning.held_deadlines import (
 )
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, repaired_routes
 from uav_task_alloc.allocator.replanning.task_lists import LegKey, build_task_list, planned_legs
-from uav_task_alloc.allocator.replanning.trips import (
-    present_trips,
-    waiting_uavs,
-    with_later_trips,
-)
+from uav_task_alloc.allocator.replanning.trips import present_trips, waiting_uavs, with_later_trips
 from uav_task_alloc.allocator.state.flight_pace import way_ahead
 from uav_task_alloc.allocator.state.flights import top_of
 from uav_task_alloc.allocator.state.published_lists import PublishedLists

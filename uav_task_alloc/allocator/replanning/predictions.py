@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from uav_task_alloc.allocator.records import UavList
+from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.state.deadlines import without_jitter
 from uav_task_alloc.allocator.state.world import World
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from uav_task_alloc.allocator.records import Proposal, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import Proposal
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, exchange_groups

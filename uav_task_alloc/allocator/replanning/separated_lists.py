@@ -7,20 +7,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import count
 
-from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.planning import BuiltLists
 from uav_task_alloc.allocator.state.flight_pace import UavFlight, slower_along, timed_stops
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.model import Leg, Point
+from uav_task_alloc.separation.leg_changes import TransitLimits
 from uav_task_alloc.separation.prediction import rule_to_go_on
-from uav_task_alloc.separation.resolution import (
-    STOPPED,
-    Resolution,
-    TransitLimits,
-    resolve,
-)
+from uav_task_alloc.separation.resolution import STOPPED, Resolution, resolve
 from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.separation.volumes import Flight, FlightLeg, leg_times
 

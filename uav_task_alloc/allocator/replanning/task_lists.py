@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops, way_ahead
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.geometry.polyline import polyline_length

@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection
 from dataclasses import replace
 
-from uav_task_alloc.allocator.records import LaterTrips
+from uav_task_alloc.allocator.list_records import LaterTrips
 from uav_task_alloc.allocator.state.flights import OVERDUE
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan, Uav

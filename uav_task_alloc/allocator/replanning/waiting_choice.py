@@ -10,7 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.allocator.records import FleetOutlook, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.replan_records import FleetOutlook
 from uav_task_alloc.allocator.replanning.demand_area import LearntDemand
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.seen_tasks import SeenTasks

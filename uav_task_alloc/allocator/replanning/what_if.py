@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from uav_task_alloc.allocator.order_records import Order
-from uav_task_alloc.allocator.records import ReplanProblem
+from uav_task_alloc.allocator.replan_records import ReplanProblem
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
 from uav_task_alloc.allocator.replanning.planning import (
     repaired_plan,

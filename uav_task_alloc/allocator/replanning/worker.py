@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from queue import SimpleQueue
 
-from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem
+from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 
 SolveFunction = Callable[[ReplanProblem, Callable[[], bool]], ReplanAnswer]
 

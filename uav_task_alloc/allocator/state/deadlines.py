@@ -6,7 +6,8 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from uav_task_alloc.allocator.records import TaskRecord, TaskVerdict, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import TaskRecord, TaskVerdict
 from uav_task_alloc.allocator.state.fleet import Fleet, may_fly
 from uav_task_alloc.allocator.state.flight_pace import FlightPace
 from uav_task_alloc.allocator.state.flights import Flights

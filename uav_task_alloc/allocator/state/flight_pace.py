@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.geometry.polyline import points_passed, segment_distance
 from uav_task_alloc.model import Point, Uav
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from uav_task_alloc.allocator.records import UavList, UavReport
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.allocator.state.callbacks import Note
 from uav_task_alloc.allocator.state.task_state_machine import TaskTransition
 from uav_task_alloc.allocator.state.tasks import TaskRegistry

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
-from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
 
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
+from uav_task_alloc.allocator.list_records import LaterTrips, UavList
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
-    LaterTrips,
     LogNote,
     Outbox,
     SavedState,
@@ -18,7 +18,6 @@ from uav_task_alloc.allocator.records import (
     TaskRecord,
     TaskState,
     TaskVerdict,
-    UavList,
     UavReport,
 )
 from uav_task_alloc.allocator.state.admission import Admission

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, Suspension, TaskMark
+from uav_task_alloc.mavlink.gcs.authority import Suspension
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, TaskMark
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.model import Point

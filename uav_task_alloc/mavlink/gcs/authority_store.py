@@ -20,7 +20,7 @@ from urllib.parse import quote
 
 from uav_task_alloc.atomic_files import replace_file, sync_folder
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState, TaskMark
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState, TaskMark
 from uav_task_alloc.mavlink.mission.piece_mark import PART_FLOWN, PART_MISSED, PieceMark
 
 _POSITION, _POSITION_SUFFIX = 'seen', '.position'  # field with a file of its own

@@ -8,13 +8,9 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import Profile
 from uav_task_alloc.mavlink.gcs.arming_and_landing import ArmingAndLanding
-from uav_task_alloc.mavlink.gcs.authority import (
-    Authority,
-    AuthorityEvent,
-    AuthorityRecord,
-    TaskMark,
-)
+from uav_task_alloc.mavlink.gcs.authority import Authority, AuthorityEvent
 from uav_task_alloc.mavlink.gcs.authority_recorder import AuthorityRecorder
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, TaskMark
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.bridge_restart import BridgeRestart
 from uav_task_alloc.mavlink.gcs.climb_check import ClimbCheck

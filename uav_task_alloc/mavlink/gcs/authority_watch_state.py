@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
-from uav_task_alloc.mavlink.gcs.authority import Authority, AuthorityEvent, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority import Authority, AuthorityEvent
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, mode_class, mode_name
 from uav_task_alloc.mavlink.gcs.sent_commands import SentCommands
 from uav_task_alloc.mavlink.gcs.status_texts import StatusTexts

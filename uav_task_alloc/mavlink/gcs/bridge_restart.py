@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityRecord, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent
 from uav_task_alloc.mavlink.gcs.authority_recorder import LANDING_RADIUS
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass
 from uav_task_alloc.mavlink.gcs.hand_over import REST_SPEED

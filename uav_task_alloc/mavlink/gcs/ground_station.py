@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.errors import UnknownName
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import profile_of
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord
 from uav_task_alloc.mavlink.gcs.early_messages import EarlyMessages
 from uav_task_alloc.mavlink.gcs.fence_store import FenceStore
 from uav_task_alloc.mavlink.gcs.hold_store import HoldStore

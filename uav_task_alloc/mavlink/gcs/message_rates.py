@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.telemetry import ESTIMATE, RATES, Telemetry
+from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.telemetry_messages import ESTIMATE, RATES
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction
-from uav_task_alloc.mavlink.gcs.authority import TaskMark
+from uav_task_alloc.mavlink.gcs.authority_state import TaskMark
 from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.resume import checksum
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry

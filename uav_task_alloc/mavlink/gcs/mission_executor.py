@@ -12,12 +12,8 @@ from collections.abc import Callable, Sequence
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
-from uav_task_alloc.mavlink.gcs.authority import (
-    AuthorityRecord,
-    AuthorityState,
-    HoldStage,
-    SendAction,
-)
+from uav_task_alloc.mavlink.gcs.authority import HoldStage, SendAction
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
 from uav_task_alloc.mavlink.gcs.end_actions import EndActions

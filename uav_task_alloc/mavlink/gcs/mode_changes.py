@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityState, Suspension
+from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, Suspension
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.climb_check import CLIMBED
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic

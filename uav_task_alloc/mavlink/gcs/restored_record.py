@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample

@@ -18,11 +18,7 @@ from uav_task_alloc.mavlink.gcs.flown_items import FlownItems
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.unread_reports import UnreadReached, UnreadReports
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
-from uav_task_alloc.mavlink.mission.items import (
-    Item,
-    TaskList,
-    with_position,
-)
+from uav_task_alloc.mavlink.mission.items import Item, TaskList, with_position
 from uav_task_alloc.mavlink.mission.passed_items import flown_between, flown_in_gap
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS
 from uav_task_alloc.mavlink.mission.progress import ProgressTable

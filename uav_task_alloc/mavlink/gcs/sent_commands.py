@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord
 from uav_task_alloc.mavlink.gcs.mode_acks import ModeAcks
 from uav_task_alloc.mavlink.transport.codec import Message
 

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction
 from uav_task_alloc.mavlink.fence.onboard_fence import FenceState
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
 from uav_task_alloc.mavlink.gcs.telemetry import STALE

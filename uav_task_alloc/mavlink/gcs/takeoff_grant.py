@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.policy import Policy
 

@@ -12,6 +12,7 @@ from uav_task_alloc.mavlink.autopilots import OFF_GROUND, ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.battery_level import BatteryLevel
 from uav_task_alloc.mavlink.gcs.boot_clock import BootClock
 from uav_task_alloc.mavlink.gcs.status_texts import failing_checks
+from uav_task_alloc.mavlink.gcs.telemetry_messages import ESTIMATE, STATE_REPORTS
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
@@ -26,25 +27,6 @@ _IN_AIR = frozenset({
     d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING})
 _SIMULATED = 2.0  # seconds of its clock in one of this program: a simulator that runs faster
 _PACE_OVER = 0.3  # [s] between two positions that measure the pace
-# requested rate [Hz] by message id
-RATES = {
-    d.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0, d.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
-    d.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0, d.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
-    d.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0, d.MAVLINK_MSG_ID_HOME_POSITION: 0.2,
-    d.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
-}
-# id of the estimator report by HEARTBEAT.autopilot
-ESTIMATE = {d.MAV_AUTOPILOT_ARDUPILOTMEGA: d.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
-            d.MAV_AUTOPILOT_PX4: d.MAVLINK_MSG_ID_ESTIMATOR_STATUS}
-# types that report a state: an older frame is ignored; all others are events
-_STATES = frozenset({'HEARTBEAT', 'GLOBAL_POSITION_INT', 'HOME_POSITION', 'BATTERY_STATUS',
-                    'SYS_STATUS', 'EXTENDED_SYS_STATE', 'MISSION_CURRENT', 'GPS_RAW_INT',
-                    'EKF_STATUS_REPORT', 'ESTIMATOR_STATUS'})
-WANTED = frozenset({*RATES, *ESTIMATE.values(), *(
-    getattr(d, 'MAVLINK_MSG_ID_' + name) for name in (
-    'HEARTBEAT', 'MISSION_REQUEST', 'MISSION_REQUEST_INT', 'MISSION_ACK', 'MISSION_COUNT',
-    'MISSION_ITEM', 'MISSION_ITEM_INT', 'MISSION_ITEM_REACHED', 'COMMAND_ACK', 'STATUSTEXT',
-    'SYSTEM_TIME', 'PARAM_VALUE', 'SMART_BATTERY_INFO'))})
 UNKNOWN: Point = (math.nan, math.nan, math.nan)
 
 
@@ -242,7 +224,7 @@ class Telemetry:
         self.frame = self.frames.note(message.get_seq(), now)
         self.received_ids.add(message.get_msgId())
         self.received_last[message.get_msgId()] = now
-        if message.get_type() in _STATES and not self._is_newest(message, now):
+        if message.get_type() in STATE_REPORTS and not self._is_newest(message, now):
             return False
         handler = self._handlers.get(message.get_type())
         if handler:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState, Suspension
+from uav_task_alloc.mavlink.gcs.authority import Suspension
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.status import UavMode, mode_of, why_not_available

@@ -21,11 +21,7 @@ from uav_task_alloc.mavlink.fence.choice import Fence, FlightSpace, choose_fence
 from uav_task_alloc.mavlink.fence.fence_parameters import FenceParameters
 from uav_task_alloc.mavlink.fence.onboard_fence import FenceState, ItemKey, OnboardFence
 from uav_task_alloc.mavlink.fence.rally import rally_alike
-from uav_task_alloc.mavlink.fence.shapes import (
-    fence_items,
-    shapes_of_items,
-    vertical_extent,
-)
+from uav_task_alloc.mavlink.fence.shapes import fence_items, shapes_of_items, vertical_extent
 from uav_task_alloc.mavlink.gcs.authority import Authority, SendAction
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy

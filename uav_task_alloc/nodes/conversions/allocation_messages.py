@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import Allocation, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import Allocation
 from uav_task_alloc.allocator.status import TaskStatus
 from uav_task_alloc.nodes.conversions.messages import (
     header,

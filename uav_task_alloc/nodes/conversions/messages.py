@@ -11,13 +11,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import (
-    REPORTED_LIMITS,
-    ListStop,
-    TaskEvent,
-    TaskEventKind,
-    UavReport,
-)
+from uav_task_alloc.allocator.list_records import ListStop
+from uav_task_alloc.allocator.records import REPORTED_LIMITS, TaskEvent, TaskEventKind, UavReport
 from uav_task_alloc.checks import check_member, check_number, check_ros_name
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone

@@ -8,7 +8,7 @@ from itertools import pairwise
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 
-from uav_task_alloc.allocator.records import UavList
+from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Point

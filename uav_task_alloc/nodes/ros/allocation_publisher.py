@@ -10,7 +10,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import Allocation, Outbox, TaskRecord, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import Allocation, Outbox, TaskRecord
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.status import TaskStatus, status_of, status_of_work
 from uav_task_alloc.errors import InvalidValue

@@ -9,7 +9,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from visualization_msgs.msg import MarkerArray
 
-from uav_task_alloc.allocator.records import Outbox, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import Outbox
 from uav_task_alloc.allocator.replanning.plan_diff import changed_tasks
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import InvalidValue

@@ -13,7 +13,8 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from uav_task_alloc import palette
-from uav_task_alloc.allocator.records import TaskRecord, TaskState, UavList
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import TaskRecord, TaskState
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.nodes.conversions.messages import header, to_point
