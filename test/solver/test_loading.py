@@ -64,6 +64,20 @@ def test_the_reason_of_a_task_that_nobody_can_reach_in_time_finds_all_kernels_lo
     assert run(LATE).stdout == 'True\nlate:\n'
 
 
+SELECTED = LOADED + """
+load_timed_kernels()
+before = loaded()
+tasks = [Task(f't{i}', (1.0 + i % 7, 1.0 + i // 7, 0.0), latest=20.0) for i in range(70)]
+print(len(plan([Uav('u', (0.0, 0.0, 0.0), cruise_speed=1.0)], tasks, route_end='home',
+               max_iterations=3000).routes['u']) > 15)
+print('late:', *sorted(loaded() - before))
+"""
+
+
+def test_a_search_that_selects_tasks_finds_all_kernels_loaded():
+    assert run(SELECTED).stdout == 'True\nlate:\n'
+
+
 MANY = LOADED + """
 load_timed_kernels(large=True)
 before = loaded()

@@ -17,6 +17,7 @@ from uav_task_alloc.solver.timed.problem import (
     TimedProblem,
     empty_timed_routes,
 )
+from uav_task_alloc.solver.timed.rebuild import rebuild
 from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
 
@@ -28,6 +29,7 @@ GIVING_UP = 0.6  # share after which a search through excess ends that found not
 PRICED_ROUNDS, PRICED_WINDOW_ROUNDS = 200.0, 1500.0
 MOST_EARLY = 0.5  # share of the last end of a route: no end before that counts
 FRESH_ROUNDS = 15.0  # rounds a task from which on a second search from new routes pays
+LABELS_A_ROUND = 0.5  # that are made at the restart for each round of search: a tenth of its time
 # probability that a place is passed over where there are at most FEW_TASKS, not BLINK_RATE: the
 # cheapest places of all of them are soon the same in each round
 FEW_TASKS, FEW_BLINKS = 10, 0.1
@@ -51,6 +53,7 @@ class TimedParams:
     nearly_last: float = 3.0  # temperatures before the last end of a route from which all count
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
     by_gaps: bool = False  # TimedArrays.gaps; so it is where tasks have prizes
+    by_labels: bool = False  # at the restart the best routes are rebuilt by labels
     intensifies: bool = False  # where there are many tasks, also as an Intensifier does
 
 
@@ -59,7 +62,7 @@ COLD = TimedParams(intensifies=True)
 SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
                         short_end_temperature=1.3, restart=0.6,
                         reheat_temperature=6.0, ruin=10.0, skipped=0.3, by_value=0.3,
-                        least_price=10.0, by_gaps=True, first_price=math.inf)
+                        least_price=10.0, by_gaps=True, by_labels=True, first_price=math.inf)
 WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
                    short_end_temperature=0.02, first_price=math.inf)
 # many tasks are new: half of the time each from the earlier routes, and from new ones
@@ -198,6 +201,9 @@ class TimedColony:
             if self._begin is not None:
                 self._end_temperature = COLD.short_end_temperature
             set_order(self.arrays, self.routes, (self._begin or self.best).order)
+            if self._params.by_labels:
+                rebuild(self.arrays, self.routes, self.best, self._rises.prizes,
+                        self._flown / spent * LABELS_A_ROUND)
         if self._intensifier:
             self._intensify(self._intensifier, spent)
         self._lead_to_early_ends(self._temperature(spent))

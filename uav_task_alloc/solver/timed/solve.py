@@ -30,6 +30,7 @@ from uav_task_alloc.solver.timed.colony import (
     TimedParams,
 )
 from uav_task_alloc.solver.timed.intensify import Intensifier, may_be_large
+from uav_task_alloc.solver.timed.labels import best_label, empty_labels
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes, make_timed
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
@@ -186,6 +187,9 @@ def _call_kernels(zones: bool, search: bool, paths: bool, large: bool) -> None:
     _improve(recorder, 0, WarmState(), None)
     to_timed_plan(problem, recorder, recorder.best, '', False)  # with the reason of the last task
     timed_reasons(problem, [0])
+    if search and not paths:
+        best_label(problem.arrays, empty_timed_routes(problem.arrays), 0,
+                   empty_labels(len(tasks), 1), 1.0, 1.0)
     if large:
         search_of_many = Intensifier(problem, problem.arrays)
         routes, scratch = empty_timed_routes(problem.arrays), empty_round(problem.arrays)
