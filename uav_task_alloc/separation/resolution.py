@@ -237,6 +237,7 @@ class _Planner:
                    for each in (after, *(change.leg for change in heights)))
 
     def _heights(self, flight: Flight, leg: FlightLeg) -> Iterator[LegChange]:
+        """The leg at other transit heights that it may have."""
         return other_heights(flight, leg, self._rule, self._limits)
 
 

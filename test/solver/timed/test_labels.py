@@ -89,13 +89,18 @@ def test_a_route_of_few_kept_labels_is_allowed_and_has_no_task_of_others(seed, z
     assert earned(problem, routes, 1, found) is not None
 
 
-def test_labels_end_where_there_is_no_room_for_more():
-    problem = problem_of(1, 60)
-    room = empty_labels(60, 20)
-    room = room._replace(link=room.link[:40], value=room.value[:40], visited=room.visited[:40])
-    label = best_label(problem.arrays, empty_timed_routes(problem.arrays), 0, room, 40.0, 1.0)
-    assert 0 < label < 40
-    assert earned(problem, empty_timed_routes(problem.arrays), 0, route_of(room, label))
+def test_labels_reach_the_end_of_the_time_though_there_is_little_room():
+    rng = random.Random(4)
+    work = [Task(f't{i}', (rng.uniform(0.0, 100.0), rng.uniform(0.0, 100.0), 0.0), latest=100.0)
+            for i in range(150)]
+    fleet = [Uav('u', (50.0, 50.0, 0.0), cruise_speed=5.0, available_until=100.0)]
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules(returns=True)), {})
+    a, routes, room = problem.arrays, empty_timed_routes(problem.arrays), empty_labels(150, 5)
+    room = room._replace(link=room.link[:1500], value=room.value[:1500],
+                         visited=room.visited[:1500])
+    found = route_of(room, best_label(a, routes, 0, room, 100.0, 0.5 * a.unserved.mean()))
+    assert earned(problem, routes, 0, found) is not None
+    assert routes.row[a.ends, at.START] > 90.0
 
 
 @pytest.mark.parametrize('uavs', [1, 2])

@@ -29,7 +29,7 @@ GIVING_UP = 0.6  # share after which a search through excess ends that found not
 PRICED_ROUNDS, PRICED_WINDOW_ROUNDS = 200.0, 1500.0
 MOST_EARLY = 0.5  # share of the last end of a route: no end before that counts
 FRESH_ROUNDS = 15.0  # rounds a task from which on a second search from new routes pays
-LABELS_A_ROUND = 0.5  # that are made at the restart for each round of search: a tenth of its time
+LABELS_A_ROUND = 0.5  # that may be made at the restart for each round of search
 # probability that a place is passed over where there are at most FEW_TASKS, not BLINK_RATE: the
 # cheapest places of all of them are soon the same in each round
 FEW_TASKS, FEW_BLINKS = 10, 0.1

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The best route of one UAV beside those of the others, by labels.
 
-A label is a way to a task. It is dropped where another one there is no later, earned no less, and
-visited no task near by that it has not (ng-routes: Baldacci, Mingozzi and Roberti 2011; labels:
-Feillet et al. 2004). A task keeps a limited number, so the best route may be missed. For
-distance alone, single trips without limited durations, and tasks without paths.
+A label is a way to a task. It is dropped where another one there is no later, no longer and no
+heavier, earned no less, and visited no task near by that it has not (labels: Feillet et al. 2004;
+ng-routes: Baldacci, Mingozzi and Roberti 2011). A task keeps a limited number, so the best route
+may be missed. For the objective of distance alone, one trip, no limit of its duration, and tasks
+without paths; ranges are kept, soft ones too.
 """
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.legs import after_leg, leg_of
 
-LABELS = 8  # made for each that may be kept, at most, about
+LABELS = 8  # at the same time for each that may be kept, about
 NEAR_TASKS = 8  # of a task, which ways to it remember: with 12 no more is found, with 4 less
 BUCKETS = 400  # of labels by time
 # columns of Labels.value, Labels.link and Labels.home; GONE: 1 where it was dropped
@@ -49,7 +50,7 @@ def empty_labels(tasks: int, kept: int) -> Labels:
         tasks: of the problem.
         kept: labels at a task, at most.
     """
-    count, words = 2 * LABELS * kept * tasks + 1, (tasks + 63) // 64
+    count, words = (2 * LABELS * kept + 1) * tasks + 1, (tasks + 63) // 64
     return Labels(np.empty((count, 4)), np.empty((count, 4), np.int64),
                   np.zeros((count, words), np.uint64), np.zeros((tasks, words), np.uint64),
                   np.empty((tasks, kept), np.int64), np.empty(tasks, np.int64),
@@ -174,26 +175,36 @@ def best_label(a: TimedArrays, r: TimedRoutes, u: int, w: Labels, end: float,
     end: [s] by which each label has departed, about. price: of a second, to choose labels by.
     """
     _begin(a, r, u, w)
-    count, best, most, first = 1, 0, _end_price(a, w, u, 0), a.begin[u, at.READY]
+    count, free, best, most = 1, -1, 0, _end_price(a, w, u, 0)
+    first, tasks, size = a.begin[u, at.READY], a.ends - a.uavs, w.link.shape[0]
     width = max((end - first) / (BUCKETS - 1), 1e-9)
     for b in range(BUCKETS):
+        room = tasks + (size - tasks) * (b + 1) // BUCKETS  # so that some is left for later ones
         while w.bucket[b] >= 0:
             label = w.bucket[b]
             w.bucket[b] = w.link[label, LATER]
             node = w.link[label, NODE]
             if w.link[label, GONE]:
+                if label != best:  # no other goes on from it
+                    w.link[label, LATER], free = free, label
                 continue
             begins = node == u
-            for k in range(a.ends - a.uavs if begins else a.near_count[node - a.uavs]):
-                if count == w.link.shape[0]:
-                    return best
+            for k in range(tasks if begins else a.near_count[node - a.uavs]):
+                new = free if free >= 0 else count
+                if new >= room:
+                    break
+                then = w.link[new, LATER]
                 j = a.uavs + k if begins else int(a.near[node - a.uavs, k])
-                if _extend(a, r, u, w, label, j, count, price):
-                    place = min(max(int((w.value[count, TIME] - first) / width), b), BUCKETS - 1)
-                    w.link[count, LATER] = w.bucket[place]
-                    w.bucket[place] = count
-                    earned = _end_price(a, w, u, count)
-                    if earned > most:
-                        best, most = count, earned
+                if not _extend(a, r, u, w, label, j, new, price):
+                    continue
+                if new == free:
+                    free = then
+                else:
                     count += 1
+                place = min(max(int((w.value[new, TIME] - first) / width), b), BUCKETS - 1)
+                w.link[new, LATER] = w.bucket[place]
+                w.bucket[place] = new
+                earned = _end_price(a, w, u, new)
+                if earned > most:
+                    best, most = new, earned
     return best
