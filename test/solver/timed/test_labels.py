@@ -11,7 +11,7 @@ from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.colony import SELECTION
 from uav_task_alloc.solver.timed.evaluator import evaluate_routes
-from uav_task_alloc.solver.timed.labels import BEFORE, NODE, best_label, empty_labels
+from uav_task_alloc.solver.timed.labels import AT_NODE, BEFORE, best_label, empty_labels
 from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
 from uav_task_alloc.solver.timed.rebuild import rebuild
@@ -42,7 +42,7 @@ def route_of(room, label):
     """Task nodes of the route that ends at a label."""
     nodes = []
     while label > 0:
-        nodes.append(int(room.link[label, NODE]))
+        nodes.append(int(room.link[label, AT_NODE]))
         label = int(room.link[label, BEFORE])
     return nodes[::-1]
 

@@ -24,23 +24,23 @@ LABELS = 8  # at the same time for each that may be kept, about
 NEAR_TASKS = 8  # of a task, which ways to it remember: with 12 no more is found, with 4 less
 BUCKETS = 400  # of labels by time
 # columns of Labels.value, Labels.link and Labels.home; GONE: 1 where it was dropped
-TIME, EARNED, FLOWN, CARRIED = range(4)
-NODE, BEFORE, LATER, GONE = range(4)
-METRES, SECONDS = range(2)
+DEPARTED, EARNED, WAY_LENGTH, TAKEN = range(4)
+AT_NODE, BEFORE, LATER, GONE = range(4)
+HOME_METRES, HOME_SECONDS = range(2)
 
 
 class Labels(NamedTuple):
     """Ways of one UAV to tasks: l labels, n tasks, w words of 64 bits."""
 
-    value: Floats  # (l, 4) columns from TIME: departure [s], price earned, way [m], load [kg]
-    link: NDArray[np.int64]  # (l, 4) columns from NODE
+    value: Floats  # (l, 4) columns from DEPARTED: departure [s], price earned, way [m], load [kg]
+    link: NDArray[np.int64]  # (l, 4) columns from AT_NODE
     visited: NDArray[np.uint64]  # (l, w) a bit a task
     near: NDArray[np.uint64]  # (n, w) a bit a task: the nearest to it
     front: NDArray[np.int64]  # (n, kept) labels at each task
     kept: NDArray[np.int64]  # (n) how many
     bucket: NDArray[np.int64]  # (buckets) first label, next ones by LATER; -1: none
     open: NDArray[np.bool_]  # (n) in no route, or in that of the UAV
-    home: Floats  # (n, 2) columns METRES and SECONDS of the leg to the end of the route
+    home: Floats  # (n, 2) columns HOME_METRES and HOME_SECONDS of the leg to the end of the route
 
 
 def empty_labels(tasks: int, kept: int) -> Labels:
@@ -71,13 +71,13 @@ def _begin(a: TimedArrays, r: TimedRoutes, u: int, w: Labels) -> None:
         t = a.uavs + i
         w.open[i] = ((r.link[t, at.OF_UAV] == a.uavs or r.link[t, at.OF_UAV] == u)
                      and (not a.restricted[i] or a.compatible[0, u, i]))
-        w.home[i, METRES], w.home[i, SECONDS] = leg_of(a, r, u, t, a.ends + u)
+        w.home[i, HOME_METRES], w.home[i, HOME_SECONDS] = leg_of(a, r, u, t, a.ends + u)
         for k in range(min(NEAR_TASKS, a.near_count[i])):
             j = int(a.near[i, k]) - a.uavs
             w.near[i, j >> 6] |= _bit(j)
-    w.value[0, TIME], w.value[0, EARNED] = a.begin[u, at.READY], 0.0
-    w.value[0, FLOWN], w.value[0, CARRIED] = 0.0, 0.0
-    w.link[0, NODE], w.link[0, BEFORE], w.link[0, LATER] = u, -1, -1
+    w.value[0, DEPARTED], w.value[0, EARNED] = a.begin[u, at.READY], 0.0
+    w.value[0, WAY_LENGTH], w.value[0, TAKEN] = 0.0, 0.0
+    w.link[0, AT_NODE], w.link[0, BEFORE], w.link[0, LATER] = u, -1, -1
     w.link[0, GONE] = 0
     w.visited[0, :] = 0
     w.bucket[0] = 0
@@ -95,10 +95,10 @@ def _covers(w: Labels, i: int, one: int, other: int) -> bool:
 @inline_kernel
 def _no_worse(w: Labels, i: int, one: int, other: int) -> bool:
     """Whether label `one` at task i makes `other` unnecessary. O(w)."""
-    return bool(w.value[one, TIME] <= w.value[other, TIME]
+    return bool(w.value[one, DEPARTED] <= w.value[other, DEPARTED]
                 and w.value[one, EARNED] >= w.value[other, EARNED] - TOLERANCE
-                and w.value[one, FLOWN] <= w.value[other, FLOWN] + TOLERANCE
-                and w.value[one, CARRIED] <= w.value[other, CARRIED] + TOLERANCE
+                and w.value[one, WAY_LENGTH] <= w.value[other, WAY_LENGTH] + TOLERANCE
+                and w.value[one, TAKEN] <= w.value[other, TAKEN] + TOLERANCE
                 and _covers(w, i, one, other))
 
 
@@ -108,13 +108,13 @@ def _keep(w: Labels, i: int, label: int, price: float) -> bool:
     for k in range(w.kept[i]):
         if _no_worse(w, i, w.front[i, k], label):
             return False
-    count, worst, least = 0, -1, w.value[label, EARNED] - price * w.value[label, TIME]
+    count, worst, least = 0, -1, w.value[label, EARNED] - price * w.value[label, DEPARTED]
     for k in range(w.kept[i]):
         other = w.front[i, k]
         if _no_worse(w, i, label, other):
             w.link[other, GONE] = 1
             continue
-        worth = w.value[other, EARNED] - price * w.value[other, TIME]
+        worth = w.value[other, EARNED] - price * w.value[other, DEPARTED]
         if worth < least:
             worst, least = count, worth
         w.front[i, count] = other
@@ -138,21 +138,22 @@ def _extend(a: TimedArrays, r: TimedRoutes, u: int, w: Labels, label: int, j: in
     i = j - a.uavs
     if not w.open[i] or w.visited[label, i >> 6] & _bit(i):
         return False
-    metres, seconds = leg_of(a, r, u, w.link[label, NODE], j)
-    start = max(after_leg(a, w.value[label, TIME], seconds, j), a.fixed[j, at.OPENS])
+    metres, seconds = leg_of(a, r, u, w.link[label, AT_NODE], j)
+    start = max(after_leg(a, w.value[label, DEPARTED], seconds, j), a.fixed[j, at.OPENS])
     left = start + a.fixed[j, at.SERVICE]
-    flown = w.value[label, FLOWN] + metres
-    load = w.value[label, CARRIED] + a.fixed[j, at.LOAD]
-    if (start > a.fixed[j, at.CLOSES] or left + w.home[i, SECONDS] > a.fixed[a.ends + u, at.CLOSES]
-            or flown + w.home[i, METRES] > a.limit[u, at.FLOWN] + TOLERANCE
+    flown = w.value[label, WAY_LENGTH] + metres
+    load = w.value[label, TAKEN] + a.fixed[j, at.LOAD]
+    if (start > a.fixed[j, at.CLOSES]
+            or left + w.home[i, HOME_SECONDS] > a.fixed[a.ends + u, at.CLOSES]
+            or flown + w.home[i, HOME_METRES] > a.limit[u, at.FLOWN] + TOLERANCE
             or load > a.limit[u, at.CARRIED] + TOLERANCE):
         return False
-    w.value[new, TIME], w.value[new, FLOWN], w.value[new, CARRIED] = left, flown, load
+    w.value[new, DEPARTED], w.value[new, WAY_LENGTH], w.value[new, TAKEN] = left, flown, load
     w.value[new, EARNED] = (w.value[label, EARNED] + a.unserved[i]
                             - a.weight[at.BY_DISTANCE] * metres)
     for k in range(w.visited.shape[1]):
         w.visited[new, k] = w.visited[label, k]
-    w.link[new, NODE], w.link[new, BEFORE], w.link[new, GONE] = j, label, 0
+    w.link[new, AT_NODE], w.link[new, BEFORE], w.link[new, GONE] = j, label, 0
     if not _keep(w, i, new, price):
         return False
     w.visited[new, i >> 6] |= _bit(i)
@@ -162,8 +163,8 @@ def _extend(a: TimedArrays, r: TimedRoutes, u: int, w: Labels, label: int, j: in
 @inline_kernel
 def _end_price(a: TimedArrays, w: Labels, u: int, label: int) -> float:
     """What a route earns that ends after a label; the empty one is as it is now. O(1)."""
-    node = w.link[label, NODE]
-    metres = a.begin[u, at.EMPTY_LENGTH] if node == u else w.home[node - a.uavs, METRES]
+    node = w.link[label, AT_NODE]
+    metres = a.begin[u, at.EMPTY_LENGTH] if node == u else w.home[node - a.uavs, HOME_METRES]
     return float(w.value[label, EARNED] - a.weight[at.BY_DISTANCE] * metres)
 
 
@@ -183,7 +184,7 @@ def best_label(a: TimedArrays, r: TimedRoutes, u: int, w: Labels, end: float,
         while w.bucket[b] >= 0:
             label = w.bucket[b]
             w.bucket[b] = w.link[label, LATER]
-            node = w.link[label, NODE]
+            node = w.link[label, AT_NODE]
             if w.link[label, GONE]:
                 if label != best:  # no other goes on from it
                     w.link[label, LATER], free = free, label
@@ -201,7 +202,7 @@ def best_label(a: TimedArrays, r: TimedRoutes, u: int, w: Labels, end: float,
                     free = then
                 else:
                     count += 1
-                place = min(max(int((w.value[new, TIME] - first) / width), b), BUCKETS - 1)
+                place = min(max(int((w.value[new, DEPARTED] - first) / width), b), BUCKETS - 1)
                 w.link[new, LATER] = w.bucket[place]
                 w.bucket[place] = new
                 earned = _end_price(a, w, u, new)

@@ -11,9 +11,9 @@ from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import Links, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.labels import (
+    AT_NODE,
     BEFORE,
     LABELS,
-    NODE,
     Labels,
     best_label,
     empty_labels,
@@ -73,7 +73,7 @@ def _with_route(a: TimedArrays, order: Links, u: int, room: Labels, label: int) 
         then = int(order[node])
         order[node], node = node, then
     while label >= 0:
-        before = int(room.link[label, NODE])
+        before = int(room.link[label, AT_NODE])
         order[before] = node
         node, label = before, int(room.link[label, BEFORE])
     return order
