@@ -29,6 +29,13 @@ def test_a_load_that_delays_the_tasks_before_it_is_taken_on_a_second_trip():
     assert result.gap < 1e-6
 
 
+def test_a_departure_that_a_soft_endurance_delays_counts_in_the_search():
+    problem = small_problem(271385)  # beyond its endurance in any order, at a price of 0
+    result = compare_small(problem, rounds=1000)
+    assert result.faults == ()
+    assert result.gap < 1e-6
+
+
 def test_a_wrong_plan_is_noticed():
     problem = small_problem(3)
     result = problem.solve(100)

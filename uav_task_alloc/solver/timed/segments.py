@@ -232,8 +232,10 @@ def update_whole(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None:
         j = _trip_forward(a, r, u, head)
         if a.timed_cost and (head >= a.uavs or a.begin[head, at.GROUNDED] > 0.0):
             most, slot = a.limit[slot_of(a, head), at.AIRBORNE], slot_of(a, head)
-            late = r.row[j, at.START] - most + r.row[head, at.LASTED]
-            if r.row[head, at.DEPARTURE] < late and r.trip[slot, at.AIRBORNE] <= most + TOLERANCE:
+            lasts = r.trip[slot, at.AIRBORNE]
+            late = r.row[j, at.START] - max(most, lasts) + r.row[head, at.LASTED]
+            if r.row[head, at.DEPARTURE] < late and (
+                    lasts <= most + TOLERANCE or a.weight[at.BY_EXCESS] < math.inf):
                 r.row[head, at.DEPARTURE] = late  # as long on the ground as endurance needs
                 _trip_forward(a, r, u, head)
         if j == end:
