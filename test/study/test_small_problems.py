@@ -36,6 +36,13 @@ def test_a_departure_that_a_soft_endurance_delays_counts_in_the_search():
     assert result.gap < 1e-6
 
 
+def test_a_later_departure_that_makes_a_locked_task_late_counts_in_the_search():
+    problem = small_problem(330839)  # for the endurance of a task behind it
+    result = compare_small(problem, rounds=1000)
+    assert result.faults == ()
+    assert result.gap < 1e-6
+
+
 def test_a_wrong_plan_is_noticed():
     problem = small_problem(3)
     result = problem.solve(100)

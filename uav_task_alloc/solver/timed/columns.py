@@ -7,9 +7,11 @@ TRIP_RELEASE, DUE, WEIGHT, WORTH, WIDTH, REMOTE, ANNOUNCED, BASE_WAY = range(8, 
 FIXED_COLUMNS = 16
 # columns of TimedArrays.begin, by UAV: ready for its first leg, time in the air by then, latest
 # departure, length and time of its route without tasks, whether this trip began at the base,
-# cruise speed, whether it has locked tasks
+# cruise speed, whether it has locked tasks, what each second costs by which they are delayed, and
+# the delay [s] from which one of them is late
 READY, IN_AIR, LAST_DEPARTURE, EMPTY_LENGTH, EMPTY_TIME, GROUNDED, CRUISE, HELD = range(8)
-BEGIN_COLUMNS = 8
+HELD_RATE, HELD_SLACK = range(8, 10)
+BEGIN_COLUMNS = 10
 # columns of TimedArrays.weight
 # FINISH_FROM: [s] from which on the search counts the end of each route, not only the last one;
 # BY_EXCESS: of a metre beyond range or endurance, inf: not allowed

@@ -70,13 +70,25 @@ def _one_of_each(uavs: Sequence[Uav], classes: Sequence[Speeds]) -> list[Uav]:
     return [next(uav for uav in uavs if speeds(uav) == each) for each in classes]
 
 
-def fixed_rows(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) -> Floats:
+def total_value(problem: Problem) -> float:
+    """Return the value of all tasks, locked ones included; 1 where there are none.
+
+    Args:
+        problem: any.
+    """
+    held = (task for tasks in problem.locked.values() for task in tasks)
+    return math.fsum(task.value for task in (*problem.tasks, *held)) or 1.0
+
+
+def fixed_rows(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]],
+               total: float) -> Floats:
     """Return (nodes, FIXED) what is known of each node.
 
     Args:
         problem: with its distances.
         visits: base visits of a UAV at most.
         aboard: ids of the tasks whose payload UAVs in the air have on board, by UAV id.
+        total: value of all tasks.
     """
     uavs, tasks = problem.uavs, problem.tasks
     m, n, goal = len(uavs), len(tasks), problem.rules.objective
@@ -86,8 +98,6 @@ def fixed_rows(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str
     fixed[:, [at.OPENS, at.RELEASE, at.TRIP_RELEASE]] = -math.inf
     fixed[:, [at.CLOSES, at.DUE]] = math.inf
     rows = fixed[m:m + n]
-    total = math.fsum(task.value for task in (*tasks, *(
-        task for held in problem.locked.values() for task in held)))
     hard = math.isinf(goal.lateness)
     loaded = {name for names in aboard.values() for name in names}
     values = np.fromiter(chain.from_iterable(map(_TASK_NUMBERS, tasks)), np.float64,

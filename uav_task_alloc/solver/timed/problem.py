@@ -23,6 +23,7 @@ from uav_task_alloc.solver.timed.node_rows import (
     fixed_rows,
     points_and_ends,
     points_of_nodes,
+    total_value,
     ways_of_tasks,
 )
 from uav_task_alloc.solver.timed.order import set_order
@@ -72,10 +73,11 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
     uavs, tasks = problem.uavs, problem.tasks
     m, n = len(uavs), len(tasks)
     visits = _visits(problem)
-    held = [after_locked(problem, u, aboard) for u in range(m)]
+    total = total_value(problem)
+    held = [after_locked(problem, u, aboard, total) for u in range(m)]
     begin = np.array([each.begin for each in held]).reshape(m, at.BEGIN_COLUMNS)
     limit = trip_limits(problem, visits, held)
-    fixed = fixed_rows(problem, visits, aboard)
+    fixed = fixed_rows(problem, visits, aboard, total)
     class_of = classes_of_uavs(problem, begin, limit, aboard)
     order = np.argsort(class_of, kind='stable')
     classes = int(class_of.max(initial=-1)) + 1

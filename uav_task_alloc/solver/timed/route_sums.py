@@ -12,6 +12,17 @@ from uav_task_alloc.solver.timed.legs import after_leg, slot_of
 
 
 @inline_kernel
+def _cost_of_held(a: TimedArrays, u: int, delay: float) -> float:
+    """Cost of UAV u's locked tasks as it departs later, without waits that absorb that. O(1).
+
+    Exact for one locked task; of several only the lateness of the first to be late counts.
+    """
+    slack = a.begin[u, at.HELD_SLACK]
+    late = max(0.0, delay - slack) - max(0.0, -slack)
+    return float(a.begin[u, at.HELD_RATE] * delay + a.weight[at.BY_LATENESS] * late)
+
+
+@inline_kernel
 def _cost_of_time(a: TimedArrays, r: TimedRoutes, u: int) -> float:
     """Cost of the times of UAV u's route; sets RATE and WAITS of all its nodes. O(tasks)."""
     j = a.ends + u
@@ -39,6 +50,8 @@ def _cost_of_time(a: TimedArrays, r: TimedRoutes, u: int) -> float:
                 cost += a.weight[at.BY_LATENESS] * late
         j = i
     r.row[i, at.RATE], r.row[i, at.WAITS] = rate, waits
+    if a.begin[u, at.HELD] > 0.0:
+        cost += _cost_of_held(a, u, r.row[u, at.DEPARTURE] - a.begin[u, at.READY])
     return float(cost)
 
 

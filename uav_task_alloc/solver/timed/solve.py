@@ -83,7 +83,7 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     first = _improve(recorder, seed, before, params)
     result = to_timed_plan(problem, recorder, recorder.best, SOLVER_NAME, warm is not None)
     if base.locked and rules.objective.response > 0.0:
-        # the search does not count that a later departure delays locked tasks
+        # how a later departure delays several locked tasks the search counts only about
         other = to_timed_plan(problem, recorder, first, SOLVER_NAME, warm is not None)
         result = min(result, other, key=lambda each: _rank(problem, each))
     search.path_budget.check()  # raises what a callback raised within a kernel

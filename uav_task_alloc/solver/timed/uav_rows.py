@@ -70,13 +70,15 @@ class UavBegin:
     load: float  # [kg] of locked tasks that it takes on
 
 
-def after_locked(problem: Problem, u: int, aboard: Mapping[str, frozenset[str]]) -> UavBegin:
+def after_locked(problem: Problem, u: int, aboard: Mapping[str, frozenset[str]],
+                 total: float) -> UavBegin:
     """Return what UAV u's locked tasks leave; they are flown as soon as possible.
 
     Args:
         problem: with its distances.
         u: index of the UAV.
         aboard: ids of the tasks whose payload UAVs in the air have on board, by UAV id.
+        total: value of all tasks.
     """
     uav = problem.uavs[u]
     held = problem.locked.get(uav.id, ())
@@ -89,16 +91,20 @@ def after_locked(problem: Problem, u: int, aboard: Mapping[str, frozenset[str]])
         in_air, last = 0.0, math.inf
         if held:
             ready = max(ready, held[0].release)
+    slack = math.inf
     for task, (i, j) in zip(held, problem.locked_legs(u), strict=True):
         seconds, service = _seconds(problem, u, i, j), service_seconds(uav, task)
         ready = max(ready, task.release) + seconds
         opened = max(task.earliest, task.release + seconds)
         in_air += seconds  # its latest time is no rule, so only a UAV in the air has to wait
         in_air += max(0.0, opened - in_air - last) + service
-        ready = max(ready, task.earliest) + service
+        ready = max(ready, task.earliest)
+        slack = min(slack, task.latest - ready)
+        ready += service
     home = problem.arrays.empty_route_length[u]
     row = (ready, in_air, last, home, _home_seconds(problem, u, home), float(uav.at_base),
-           uav.cruise_speed, float(bool(held)))
+           uav.cruise_speed, float(bool(held)),
+           problem.rules.objective.response * sum(task.value for task in held) / total, slack)
     return UavBegin(row, sum(task.payload for task in loads))
 
 
