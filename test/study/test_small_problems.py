@@ -37,7 +37,7 @@ def test_a_departure_that_a_soft_endurance_delays_counts_in_the_search():
 
 
 def test_a_later_departure_that_makes_a_locked_task_late_counts_in_the_search():
-    problem = small_problem(330839)  # for the endurance of a task behind it
+    problem = small_problem(330839)  # a task after it needs the endurance
     result = compare_small(problem, rounds=1000)
     assert result.faults == ()
     assert result.gap < 1e-6
