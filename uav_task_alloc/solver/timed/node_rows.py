@@ -109,7 +109,8 @@ def fixed_rows(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str
     rows[:, at.WEIGHT] = goal.response * rows[:, at.WORTH] / total
     rows[:, at.WIDTH] = np.minimum(values[:, 1], 1e9) - np.maximum(values[:, 0], -1e9)
     release = np.where(values[:, 5] > 0.0, values[:, 5], -math.inf)
-    whole_trip = np.array([task.payload > 0.0 and task.id not in loaded for task in tasks], bool)
+    whole_trip = values[:, 2] > 0.0
+    whole_trip[[i for i in np.flatnonzero(whole_trip) if tasks[i].id in loaded]] = False
     rows[whole_trip, at.TRIP_RELEASE] = release[whole_trip]
     rows[~whole_trip, at.RELEASE] = release[~whole_trip]
     until = np.array([uav.available_until for uav in uavs])

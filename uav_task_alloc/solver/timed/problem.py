@@ -76,12 +76,13 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
     total = total_value(problem)
     held = [after_locked(problem, u, aboard, total) for u in range(m)]
     begin = np.array([each.begin for each in held]).reshape(m, at.BEGIN_COLUMNS)
-    limit = trip_limits(problem, visits, held)
+    limit = trip_limits(problem, visits, begin, np.array([each.load for each in held]))
     fixed = fixed_rows(problem, visits, aboard, total)
     class_of = classes_of_uavs(problem, begin, limit, aboard)
     order = np.argsort(class_of, kind='stable')
     classes = int(class_of.max(initial=-1)) + 1
-    rules, classes_of_speeds = problem.rules, list(dict.fromkeys(map(speeds, uavs)))
+    rules, speeds_of_uavs, pace = problem.rules, [*map(speeds, uavs)], paces(uavs)
+    classes_of_speeds = list(dict.fromkeys(speeds_of_uavs))
     paths = np.empty((0, 0) if any(task.path for task in tasks) else 0, np.bool_)
     nodes = len(points_of_nodes(problem, visits))
     far, way_length, along = ways_of_tasks(problem, nodes, classes_of_speeds)
@@ -92,15 +93,15 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
         path_times(problem.distances, classes_of_speeds), points_and_ends(problem, visits), fixed,
         paths, far, np.array([bool(task.path) and task.reversible for task in tasks], np.bool_),
         way_length, along,
-        paces(uavs),
-        np.array([classes_of_speeds.index(speeds(uav)) for uav in uavs], np.int64), begin, limit,
+        pace,
+        np.array([*map(classes_of_speeds.index, speeds_of_uavs)], np.int64), begin, limit,
         compatible_trips(problem, aboard),
         np.zeros(n, np.bool_), np.full(4, math.inf), np.empty(n), _weights(problem),
         np.empty((n, min(WINDOW_NEIGHBOURS, max(0, n - 1))), LINK),
         np.empty((n, min(WINDOW_NEIGHBOURS, max(0, n - 1)))), np.zeros(n, np.int64),
         np.full((n, min(NEAR_CLASSES, classes)), -1, np.int64), order.astype(np.int64),
         np.searchsorted(class_of[order], np.arange(classes + 1)).astype(np.int64), class_of,
-        *least_pace(problem), False)
+        *least_pace(problem, pace), False)
     arrays.restricted[:] = ~arrays.compatible.all(axis=(0, 1)) if m else False
     scale = _fill(problem, arrays, known)
     _set_prices(problem, arrays, scale)

@@ -28,13 +28,13 @@ def is_flat(problem: Problem) -> bool:
     return not problem.distances.zones and bool((z == z[:1]).all())
 
 
-def least_pace(problem: Problem) -> tuple[float, float]:
+def least_pace(problem: Problem, rows: Floats) -> tuple[float, float]:
     """Return TimedArrays.least_pace and least_cut.
 
     Args:
         problem: with its distances.
+        rows: (m, 3) what `paces` gives for its UAVs.
     """
-    rows = paces(problem.uavs)
     flat, steep = rows[:, 0], rows[:, 1:].min(axis=1, initial=math.inf)
     if not is_flat(problem):  # the way climbs as steeply as is fastest
         flat = flat * steep / np.hypot(flat, steep)
@@ -80,17 +80,20 @@ def after_locked(problem: Problem, u: int, aboard: Mapping[str, frozenset[str]],
         aboard: ids of the tasks whose payload UAVs in the air have on board, by UAV id.
         total: value of all tasks.
     """
-    uav = problem.uavs[u]
+    uav, at_base = problem.uavs[u], problem.uavs[u].at_base
     held = problem.locked.get(uav.id, ())
+    ready, in_air, last = uav.available_from, 0.0, math.inf
+    if not at_base:
+        in_air, last = ready, 0.0
+    home = float(problem.arrays.empty_route_length[u])
+    end = home, _home_seconds(problem, u, home), float(at_base), uav.cruise_speed
+    if not held:
+        return UavBegin((ready, in_air, last, *end, 0.0, 0.0, math.inf), 0.0)
     loads = [task for task in held if task.payload > 0.0
-             and task.id not in aboard.get(uav.id, ())] if uav.at_base else []
-    ready = max([uav.available_from, *(task.release for task in loads)])
-    if not uav.at_base:
-        in_air, last = uav.available_from, 0.0
-    else:
-        in_air, last = 0.0, math.inf
-        if held:
-            ready = max(ready, held[0].release)
+             and task.id not in aboard.get(uav.id, ())] if at_base else []
+    ready = max([ready, *(task.release for task in loads)])
+    if at_base:
+        ready = max(ready, held[0].release)
     slack = math.inf
     for task, (i, j) in zip(held, problem.locked_legs(u), strict=True):
         seconds, service = _seconds(problem, u, i, j), service_seconds(uav, task)
@@ -101,11 +104,9 @@ def after_locked(problem: Problem, u: int, aboard: Mapping[str, frozenset[str]],
         ready = max(ready, task.earliest)
         slack = min(slack, task.latest - ready)
         ready += service
-    home = problem.arrays.empty_route_length[u]
-    row = (ready, in_air, last, home, _home_seconds(problem, u, home), float(uav.at_base),
-           uav.cruise_speed, float(bool(held)),
-           problem.rules.objective.response * sum(task.value for task in held) / total, slack)
-    return UavBegin(row, sum(task.payload for task in loads))
+    weight = problem.rules.objective.response * sum(task.value for task in held) / total
+    return UavBegin((ready, in_air, last, *end, 1.0, weight, slack),
+                    sum(task.payload for task in loads))
 
 
 def _seconds(problem: Problem, u: int, i: int, j: int) -> float:
@@ -123,27 +124,28 @@ def _home_seconds(problem: Problem, u: int, metres: float) -> float:
     return _seconds(problem, u, u, problem.arrays.ends + u) if metres > 0.0 else 0.0
 
 
-def trip_limits(problem: Problem, visits: int, held: Sequence[UavBegin]) -> Floats:
+def trip_limits(problem: Problem, visits: int, begin: Floats, loads: Floats) -> Floats:
     """Return (slots, TRIP) capacity, range and endurance of each trip; what is used stays.
 
     Args:
         problem: with its distances.
         visits: base visits of a UAV at most.
-        held: how each UAV begins.
+        begin: (m, BEGIN) how each UAV begins.
+        loads: (m) [kg] of locked tasks that each takes on.
     """
-    m = len(problem.uavs)
+    uavs, m = problem.uavs, len(problem.uavs)
     limit = np.full((m * (1 + visits), at.TRIP_COLUMNS), math.inf)
-    for u, uav in enumerate(problem.uavs):
-        begin = held[u].begin
-        if uav.at_base:
-            limit[u, at.CARRIED] = max(0.0, uav.payload_capacity - held[u].load)
-        limit[u, at.FLOWN] = max(problem.arrays.range_left[u], begin[at.EMPTY_LENGTH])
-        limit[u, at.AIRBORNE] = max(uav.endurance, begin[at.IN_AIR] + begin[at.EMPTY_TIME])
-        rows = limit[m + u * visits:m + (u + 1) * visits]
-        rows[:, at.CARRIED] = uav.payload_capacity
-        rows[:, at.FLOWN] = uav.range if uav.full_range is None else uav.full_range
-        rows[:, at.AIRBORNE] = (uav.endurance if uav.full_endurance is None
-                             else uav.full_endurance)
+    capacity = np.array([uav.payload_capacity for uav in uavs])
+    limit[:m, at.CARRIED] = np.where(begin[:, at.GROUNDED] > 0.0,
+                                     np.maximum(0.0, capacity - loads), math.inf)
+    limit[:m, at.FLOWN] = np.maximum(problem.arrays.range_left, begin[:, at.EMPTY_LENGTH])
+    limit[:m, at.AIRBORNE] = np.maximum([uav.endurance for uav in uavs],
+                                        begin[:, at.IN_AIR] + begin[:, at.EMPTY_TIME])
+    if visits:
+        full = [(uav.payload_capacity, uav.range if uav.full_range is None else uav.full_range,
+                 uav.endurance if uav.full_endurance is None else uav.full_endurance)
+                for uav in uavs]
+        limit[m:, [at.CARRIED, at.FLOWN, at.AIRBORNE]] = np.repeat(full, visits, axis=0)
     return limit
 
 
@@ -181,13 +183,14 @@ def classes_of_uavs(problem: Problem, begin: Floats, limit: Floats,
         limit: (slots, TRIP) of each trip.
         aboard: ids of the tasks whose payload UAVs in the air have on board, by UAV id.
     """
-    m, points = len(problem.uavs), problem.distances.points
+    uavs, m, points = problem.uavs, len(problem.uavs), problem.distances.points
     n, compatible = len(problem.tasks), np.packbits(problem.arrays.compatible, axis=1)
+    others = [(uav.climb_speed, uav.descent_speed, uav.available_until, uav.turnaround)
+              for uav in uavs]
+    numbers = np.hstack([points[:m], points[m + n:2 * m + n], begin, limit[:m],
+                         limit[m:].reshape(m, (len(limit) - m) * at.TRIP_COLUMNS // max(1, m)),
+                         np.array(others, np.float64).reshape(m, 4)])
     seen: dict[object, int] = {}
-    rows = limit.reshape(m, -1) if m and len(limit) == m else np.hstack(
-        [limit[:m], limit[m:].reshape(m, -1)])
-    return np.array([seen.setdefault(
-        (points[u].tobytes(), points[m + n + u].tobytes(), begin[u].tobytes(), rows[u].tobytes(),
-         compatible[u].tobytes(), uav.climb_speed, uav.descent_speed, uav.available_until,
-         uav.turnaround, aboard.get(uav.id)), len(seen))
-        for u, uav in enumerate(problem.uavs)], np.int64)
+    return np.array([seen.setdefault((numbers[u].tobytes(), compatible[u].tobytes(),
+                                      aboard.get(uav.id)), len(seen))
+                     for u, uav in enumerate(uavs)], np.int64)
