@@ -78,6 +78,20 @@ def test_a_search_that_selects_tasks_finds_all_kernels_loaded():
     assert run(SELECTED).stdout == 'True\nlate:\n'
 
 
+COMBINED = LOADED + """
+load_timed_kernels(few=True)
+before = loaded()
+tasks = [Task(f't{i}', (1.0 + i % 7, 1.0 + i // 7, 0.0), latest=20.0) for i in range(70)]
+uavs = [Uav(name, (0.0, 0.0, 0.0), cruise_speed=1.0) for name in 'uv']
+print(len(plan(uavs, tasks, max_iterations=3000).routes['u']) > 9)
+print('late:', *sorted(loaded() - before))
+"""
+
+
+def test_a_search_that_combines_routes_of_few_uavs_finds_all_kernels_loaded():
+    assert run(COMBINED).stdout == 'True\nlate:\n'
+
+
 MANY = LOADED + """
 load_timed_kernels(large=True)
 before = loaded()

@@ -115,3 +115,6 @@ def test_a_best_beyond_range_or_an_empty_pool_or_no_work_changes_nothing():
     into = empty_routes(problem.arrays)
     assert not recombine(problem.arrays, worst, pool, 0.0, into)
     assert recombine(problem.arrays, worst, pool, WORK, into)
+    remove(problem.arrays, worst, NODE(problem.arrays.uavs))  # so that it leaves a task out
+    assert not recombine(problem.arrays, worst, pool, 0.0, into)
+    assert recombine(problem.arrays, worst, pool, WORK, into)

@@ -20,7 +20,7 @@ from uav_task_alloc.solver.solve import load_kernels
 from uav_task_alloc.solver.timed.solve import load_timed_kernels
 
 _BUDGET = 0.05  # [s] of each solve
-_WORK = KernelWork(49.0, 330)
+_WORK = KernelWork(51.5, 372)
 _ZONES = (
     ThreatZone.hemisphere('dome', (100.0, 0.0, 0.0), 30.0),
     ThreatZone.cylinder('column', (300.0, 0.0), 30.0, 0.0, 100.0),
@@ -40,7 +40,7 @@ def compile_kernels(plan: Callable[..., Plan], params: AllocatorParams) -> int:
     """
     with NOTICE.until_loaded('allocator', _WORK, whole=True):
         load_kernels(zones=True)
-        load_timed_kernels(zones=True)  # any task may have a deadline
+        load_timed_kernels(zones=True, few=True)  # any task may have a deadline
         load_separation_kernels()  # its parameters may change at any time
         load_waiting_kernels()  # so may `anticipate`
         return _planned(plan, params)

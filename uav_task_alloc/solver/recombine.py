@@ -22,7 +22,6 @@ from uav_task_alloc.solver.routes import (
 GROUP_SIZE = 10  # UAVs
 _NEAR_TASKS = 6  # neighbours of a task that make two routes adjacent
 PASSES = 2  # over all groups
-MAX_TRIES = 20_000  # columns tried in a group at most
 TRY_COST = 4.0  # work of a try, in stops read
 
 
@@ -91,15 +90,15 @@ def _improve(a: Arrays, pool: Pool, reduced: Reduced, tries: int, flown: Ints, u
     Returns:
         Whether it fell; then the routes are written to `into`.
     """
-    improved = False
+    improved, seeds = False, a.uavs if a.uavs > GROUP_SIZE else min(1, a.uavs)
     for _ in range(PASSES):
         improved_in_pass = False
-        for u in range(a.uavs):
+        for u in range(seeds):  # all are in the group of each where there are few
             if tries <= 0:
                 break
             group = _group(a, pool, uav_of, flown, u)
-            better, tried = repartition(pool, reduced, group, _tasks_of(a, uav_of, group),
-                                        min(MAX_TRIES, tries), flown, uav_of)
+            better, tried = repartition(pool, reduced, group, _tasks_of(a, uav_of, group), tries,
+                                        flown, uav_of)
             improved_in_pass |= better
             tries -= tried
         improved |= improved_in_pass

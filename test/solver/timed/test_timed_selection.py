@@ -79,16 +79,15 @@ def test_leaving_a_task_out_costs_much_more_than_serving_tasks_in_clusters():
     colony = TimedColony(problem, first_plan(problem, WarmState()), 3, SELECTION)
     before = colony.arrays.unserved.copy()
     values = np.array([task.value for task in work])
-    colony.fly(0.0, 0.5, 200)
+    colony.fly(0.0, 0.2, 200)
     assert colony.arrays.unserved == pytest.approx(before)
-    colony.fly(0.7, 0.8, 0)
-    cost, worth = colony.best.score
+    cost, worth = colony.best.score.copy()
+    colony.fly(0.85, 0.9, 0)
     most = np.maximum(before, 10.0 * cost / worth * values)
     assert most.max() > 1.5 * before.max()
     assert colony.arrays.unserved == pytest.approx(most)
     rise = most.sum() / before.sum()
-    assert colony._temperature(0.6) == pytest.approx(
-        rise * SELECTION.reheat_temperature * problem.scale)
+    assert colony._temperature(0.85) == pytest.approx(rise * 10.0 * problem.scale)
 
 
 def windows_problem():

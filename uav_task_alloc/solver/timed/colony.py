@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from uav_task_alloc.solver.colony import WORK
 from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.timed import columns as at
-from uav_task_alloc.solver.timed.intensify import Intensifier, is_large
+from uav_task_alloc.solver.timed.intensify import Intensifier, fly_instead, is_large
 from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.problem import (
     MAX_UNSERVED_GROWTH,
@@ -18,55 +19,61 @@ from uav_task_alloc.solver.timed.problem import (
     empty_timed_routes,
 )
 from uav_task_alloc.solver.timed.rebuild import rebuild
+from uav_task_alloc.solver.timed.route_pool import combined, route_pool
 from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
 
 LEAST_PRICE, MOST_PRICE = 0.1, 100.0  # of excess, over the first price
 DECISION = 0.02  # share of the budget after which the rounds in all are estimated
-GIVING_UP = 0.6  # share after which a search through excess ends that found nothing better
+# share after which a search through excess ends that found nothing better; temperature then
+GIVING_UP, GIVEN_UP = 0.6, 1.0
 # rounds a task from which on passing through excess pays: where durations or trips are limited,
 # and where only windows and loads are
 PRICED_ROUNDS, PRICED_WINDOW_ROUNDS = 200.0, 1500.0
 MOST_EARLY = 0.5  # share of the last end of a route: no end before that counts
 FRESH_ROUNDS = 15.0  # rounds a task from which on a second search from new routes pays
-LABELS_A_ROUND = 0.5  # that may be made at the restart for each round of search
+LABELS_FROM = 0.6  # least share of the budget after which routes are rebuilt by labels
+LABELS_A_ROUND = 0.5  # that may be made then for each round of search
 # probability that a place is passed over where there are at most FEW_TASKS, not BLINK_RATE: the
 # cheapest places of all of them are soon the same in each round
 FEW_TASKS, FEW_BLINKS = 10, 0.1
+
+Coolings = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class TimedParams:
     """Parameters of a colony; temperatures in mean legs to the nearest neighbour."""
 
-    start_temperature: float = 10.0
-    end_temperature: float = 0.1
+    # share of the budget from which on the search goes on from its best, temperature then
+    coolings: Coolings = ((0.0, 10.0),)
+    pool_coolings: Coolings = ()  # in place of them where routes are combined
+    end_temperature: float = 0.1  # of each
     short_end_temperature: float = 0.3  # the same where there are few rounds
-    restart: float = 1.0  # share of the budget after which the search goes on from its best
-    reheat_temperature: float = 1.0  # then
     ruin: float = 15.0  # tasks that a round removes
     first_price: float = 3.0  # of a second, metre or mean load of excess, in what one costs to fly
     absent: int = 10  # absent tasks that a round tries to insert, besides those it removes
     skipped: float = 0.0  # probability that a round passes over one of them
     by_value: float = 0.0  # share of rounds that insert about the most valuable tasks first
-    least_price: float = 0.0  # of a task after the restart, over what served ones cost by value
+    least_price: float = 0.0  # of a task after a cooling, over what served ones cost by value
     nearly_last: float = 3.0  # temperatures before the last end of a route from which all count
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
     by_gaps: bool = False  # TimedArrays.gaps; so it is where tasks have prizes
-    by_labels: bool = False  # at the restart the best routes are rebuilt by labels
+    by_labels: bool = False  # the best routes are rebuilt by labels
     intensifies: bool = False  # where there are many tasks, also as an Intensifier does
 
 
 COLD = TimedParams(intensifies=True)
 # where many tasks have to be left out: the choice of tasks, more than their order
-SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
-                        short_end_temperature=1.3, restart=0.6,
-                        reheat_temperature=6.0, ruin=10.0, skipped=0.3, by_value=0.3,
+SELECTION = TimedParams(coolings=((0.0, 60.0), (0.6, 6.0)), end_temperature=1.3,
+                        pool_coolings=((0.0, 60.0), (0.25, 60.0), (0.45, 60.0), (0.65, 60.0),
+                                       (0.85, 10.0), (0.98, 1.3)),
+                        short_end_temperature=1.3, ruin=10.0, skipped=0.3, by_value=0.3,
                         least_price=10.0, by_gaps=True, by_labels=True, first_price=math.inf)
-WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
+WARM = TimedParams(coolings=((0.0, 0.3),), end_temperature=0.02,
                    short_end_temperature=0.02, first_price=math.inf)
 # many tasks are new: half of the time each from the earlier routes, and from new ones
-WARM_AND_FRESH = replace(WARM, restart=0.5, reheat_temperature=COLD.start_temperature)
+WARM_AND_FRESH = replace(WARM, coolings=(*WARM.coolings, (0.5, COLD.coolings[0][1])))
 
 
 class TimedColony:
@@ -92,10 +99,13 @@ class TimedColony:
         self._goal, self._decided = problem.base.rules.objective, False
         self.routes = empty_timed_routes(self.arrays)
         set_order(self.arrays, self.routes, start.order)
-        self._begin = begin
+        self._begin, self._base = begin, problem.base.arrays
+        self._pool = route_pool(self.arrays, self._base, bool(params.pool_coolings))
+        self._coolings = params.pool_coolings if self._pool.uav.size else params.coolings
         self._price, self._flown = arrays.price, 0
         self._gains = 1  # improvements, from when on excess is allowed
-        self._restarted, self._end_temperature = False, params.end_temperature
+        self._cooling, self._rebuilt = 0, False
+        self._end_temperature = params.end_temperature
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
         tasks = arrays.ends - arrays.uavs
         growth = 1.0 if problem.prizes else params.unserved_growth
@@ -122,7 +132,7 @@ class TimedColony:
         """Go on from the best without excess: windows may be too tight for it."""
         np.copyto(self.arrays.price, self._price)
         self._rises = self._rises._replace(least=np.full(4, math.inf), most=np.full(4, math.inf))
-        self._params, self._gains = replace(self._params, restart=GIVING_UP), 1
+        self._coolings, self._gains = (*self._coolings[:1], (GIVING_UP, GIVEN_UP)), 1
 
     def _raise_prices(self) -> None:
         """Let a task left out cost much more than those served cost, each by its value.
@@ -149,12 +159,32 @@ class TimedColony:
 
     def _temperature(self, spent: float) -> float:
         """Temperature in cost after this share of the budget."""
-        p, first, share = self._params, self._params.start_temperature, spent
-        if self._restarted:
-            first, share = p.reheat_temperature, (spent - p.restart) / (1.0 - p.restart)
-        elif p.restart < 1.0:
-            share = min(1.0, spent / p.restart)
+        began, first = self._coolings[self._cooling]
+        share = min(1.0, (spent - began) / (self._next_cooling(1.0) - began))
         return float(self._scale * first * (self._end_temperature / first) ** share)
+
+    def _next_cooling(self, default: float) -> float:
+        """Share of the budget after which the next cooling begins."""
+        later = self._coolings[self._cooling + 1:]
+        return later[0][0] if later else default
+
+    def _restart(self, spent: float) -> None:
+        """Begin the next cooling from the best, with higher prices and better combinations."""
+        while spent >= self._next_cooling(math.inf):
+            self._cooling += 1
+        self._raise_prices()
+        if self._begin is not None:
+            self._end_temperature = COLD.short_end_temperature
+        set_order(self.arrays, self.routes, (self._begin or self.best).order)
+        if self._pool.size[0] > 0:
+            found = combined(self.arrays, self._base, self.routes, self._pool,
+                             WORK * self._flown / spent)
+            if found is not None:
+                fly_instead(self.arrays, found, self._rises.prizes, self.best, self.routes)
+        if self._params.by_labels and spent >= LABELS_FROM and not self._rebuilt:
+            self._rebuilt = True
+            rebuild(self.arrays, self.routes, self.best, self._rises.prizes,
+                    self._flown / spent * LABELS_A_ROUND)
 
     def _lead_to_early_ends(self, temperature: float) -> None:
         """Let the search count all ends that are nearly the last one, as columns.py defines.
@@ -186,7 +216,7 @@ class TimedColony:
             self._decided = True
             tasks = self.arrays.ends - self.arrays.uavs
             if self._begin is not None and self._flown / spent < FRESH_ROUNDS * tasks:
-                self._params, self._begin = WARM, None
+                self._params, self._coolings, self._begin = WARM, WARM.coolings, None
             least = PRICED_ROUNDS if self.arrays.whole else PRICED_WINDOW_ROUNDS
             if (self._flown / spent >= least * tasks
                     and math.isfinite(self._params.first_price)):
@@ -195,20 +225,13 @@ class TimedColony:
                 self._end_temperature = self._params.short_end_temperature
         if self._gains == 0 and spent >= GIVING_UP:
             self._forbid_excess()
-        if spent >= self._params.restart and not self._restarted:
-            self._restarted = True
-            self._raise_prices()
-            if self._begin is not None:
-                self._end_temperature = COLD.short_end_temperature
-            set_order(self.arrays, self.routes, (self._begin or self.best).order)
-            if self._params.by_labels:
-                rebuild(self.arrays, self.routes, self.best, self._rises.prizes,
-                        self._flown / spent * LABELS_A_ROUND)
+        if spent >= self._next_cooling(math.inf):
+            self._restart(spent)
         if self._intensifier:
             self._intensify(self._intensifier, spent)
         self._lead_to_early_ends(self._temperature(spent))
-        self._gains += anneal(self.arrays, self.routes, self._round, self.best, self._rises,
-                              self._params.ruin, self._temperature(spent),
+        self._gains += anneal(self.arrays, self.routes, self._round, self.best, self._pool,
+                              self._rises, self._params.ruin, self._temperature(spent),
                               self._temperature(until), rounds, self._rng)
         self._flown += rounds
         return rounds

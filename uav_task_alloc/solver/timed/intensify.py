@@ -86,12 +86,26 @@ class Intensifier:
         found = recombined(a, self._base, routes, self._pool, WORK * rounds)
         if found is None:
             return
-        order = np.arange(node_count(a)).astype(LINK)
-        for u, tasks in enumerate(found):
-            nodes = [u, *tasks, a.ends + u]
-            order[nodes[:-1]] = nodes[1:]
-        set_order(a, routes, order)
-        every = np.arange(a.uavs, a.ends)
-        fill_routes(a, routes, no_routes(a), every[order[a.uavs:a.ends] == every], self._prizes,
-                    best, rng_state(0))
-        set_order(a, routes, best.order)
+        fly_instead(a, found, self._prizes, best, routes)
+
+
+def fly_instead(a: TimedArrays, found: Sequence[Sequence[int]], prizes: bool, best: Incumbent,
+                routes: TimedRoutes) -> None:
+    """Keep other routes, with more tasks inserted where that is possible, if they are better.
+
+    Args:
+        a: the problem.
+        found: task nodes by UAV.
+        prizes: whether tasks may be left out because they are not worth their way.
+        best: is overwritten with what is better.
+        routes: are overwritten with the best.
+    """
+    order = np.arange(node_count(a)).astype(LINK)
+    for u, tasks in enumerate(found):
+        nodes = [u, *tasks, a.ends + u]
+        order[nodes[:-1]] = nodes[1:]
+    set_order(a, routes, order)
+    every = np.arange(a.uavs, a.ends)
+    fill_routes(a, routes, no_routes(a), every[order[a.uavs:a.ends] == every], prizes, best,
+                rng_state(0))
+    set_order(a, routes, best.order)

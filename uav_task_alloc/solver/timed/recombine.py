@@ -15,7 +15,7 @@ from uav_task_alloc.kernel import allocating_kernel, inline_kernel, inner_kernel
 from uav_task_alloc.solver.multipliers import Reduced, reduced_costs
 from uav_task_alloc.solver.partition import Flags, repartition
 from uav_task_alloc.solver.pool import Pool, empty_pool, new_column, slot_of_key
-from uav_task_alloc.solver.recombine import GROUP_SIZE, MAX_TRIES, PASSES, TRY_COST
+from uav_task_alloc.solver.recombine import GROUP_SIZE, PASSES, TRY_COST
 from uav_task_alloc.solver.routes import TINY, Arrays, Ints
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TimedArrays, TimedRoutes
@@ -45,7 +45,7 @@ def labelled(a: TimedArrays, base: Arrays) -> Arrays:
 
 
 @inline_kernel
-def _cost(a: TimedArrays, r: TimedRoutes, u: int) -> float:
+def cost_of_route(a: TimedArrays, r: TimedRoutes, u: int) -> float:
     """What UAV u's route costs more than an empty one. O(1)."""
     cost = a.weight[at.BY_DISTANCE] * (r.route[u, at.METRES] - a.begin[u, at.EMPTY_LENGTH])
     cost += r.route[u, at.TIME_COST]
@@ -64,7 +64,7 @@ def collect_timed(a: TimedArrays, r: TimedRoutes, timed: TimedPool) -> bool:
         if r.route[u, at.TASKS] == 0.0 or is_infeasible(a, r, u):
             continue
         k, t = a.class_of[u], r.link[u, at.NEXT]
-        key, label, tasks, cost = pool.node_hash[k], np.int64(t), 0, _cost(a, r, u)
+        key, label, tasks, cost = pool.node_hash[k], np.int64(t), 0, cost_of_route(a, r, u)
         while t < a.ends:
             key ^= pool.node_hash[t + n]
             label, tasks = min(label, np.int64(t)), tasks + 1
@@ -178,8 +178,7 @@ def _improve(a: TimedArrays, timed: TimedPool, reduced: Reduced, tries: int, flo
                 then[i] = flown[i]
             for i in range(label_of.size):
                 then_of[i] = label_of[i]
-            better, tried = repartition(pool, reduced, group, tasks[:count],
-                                        min(MAX_TRIES, tries), then, then_of)
+            better, tried = repartition(pool, reduced, group, tasks[:count], tries, then, then_of)
             tries -= tried
             if better and not _too_many(a, timed, then, used):
                 fell = True

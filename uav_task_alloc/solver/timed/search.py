@@ -9,6 +9,7 @@ import numpy as np
 
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import inline_kernel, inner_kernel, kernel
+from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
 from uav_task_alloc.solver.timed import columns as at
@@ -21,6 +22,7 @@ from uav_task_alloc.solver.timed.arrays import (
     node_count,
 )
 from uav_task_alloc.solver.timed.order import route_order, true_cost
+from uav_task_alloc.solver.timed.route_pool import collect_routes
 from uav_task_alloc.solver.timed.route_sums import cost_of
 from uav_task_alloc.solver.timed.ruin import (
     ABSENT,
@@ -111,8 +113,9 @@ def record(a: TimedArrays, r: TimedRoutes, best: Incumbent, prizes: bool) -> boo
 
 
 @inner_kernel
-def _update_prices(a: TimedArrays, r: TimedRoutes, w: Round, rises: Rises) -> None:
-    """Adapt the prices of excess and of tasks in no route. O(n)."""
+def _update_prices(a: TimedArrays, r: TimedRoutes, w: Round, pool: Pool, rises: Rises) -> None:
+    """Adapt the prices of excess and of tasks in no route, collect the routes. O(n)."""
+    collect_routes(a, r, pool)
     for c in range(4):
         if rises.least[c] < math.inf:
             if r.sums[c] > TOLERANCE:
@@ -137,8 +140,8 @@ def _limit(before: float, temperature: float, rng: RngState) -> float:
 
 
 @kernel
-def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Rises, mean: float,
-           start: float, end: float, rounds: int, rng: RngState) -> int:
+def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, pool: Pool, rises: Rises,
+           mean: float, start: float, end: float, rounds: int, rng: RngState) -> int:
     """Anneal r from temperature `start` to `end` [cost]; returns how often the best improved.
 
     A round removes about `mean` tasks.
@@ -149,7 +152,7 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
     for _ in range(rounds):
         w.counts[PATIENCE] -= 1
         if w.counts[PATIENCE] < 0:
-            _update_prices(a, r, w, rises)
+            _update_prices(a, r, w, pool, rises)
             w.counts[PATIENCE] = max(20, (a.ends - a.uavs) // 8)
         before, generous = cost_of(a, r.sums), 1.0
         begin_round(r, w)

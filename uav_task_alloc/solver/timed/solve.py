@@ -8,9 +8,12 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
+import numpy as np
+
 from uav_task_alloc.kernel_cache import (
     NO_WORK,
     NOTICE,
+    TIMED_FEW_WORK,
     TIMED_FIRST_WORK,
     TIMED_LARGE_WORK,
     TIMED_SEARCH_WORK,
@@ -18,7 +21,9 @@ from uav_task_alloc.kernel_cache import (
 )
 from uav_task_alloc.model import Plan, Task, ThreatZone, Uav, turned_tasks
 from uav_task_alloc.solver.chain_q import run_colonies
+from uav_task_alloc.solver.multipliers import reduced_costs
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
+from uav_task_alloc.solver.pool import empty_pool
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.timed.answer import to_timed_plan
 from uav_task_alloc.solver.timed.colony import (
@@ -34,6 +39,7 @@ from uav_task_alloc.solver.timed.labels import best_label, empty_labels
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes, make_timed
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
+from uav_task_alloc.solver.timed.route_pool import may_combine, pack_routes
 from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import BEST_WORTH, FEW_ABSENT, Incumbent
 from uav_task_alloc.solver.timed.warm import completed, first_plan
@@ -68,7 +74,8 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
         The best plan found, with its times.
     """
     load_timed_kernels(bool(limits.zones), max_iterations != 0, any(task.path for task in tasks),
-                       warm is None and may_be_large(tasks, rules))
+                       warm is None and may_be_large(tasks, rules),
+                       warm is None and may_combine(uavs, tasks, rules))
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     known = before.problem
@@ -157,7 +164,7 @@ def _aboard(uavs: Sequence[Uav], tasks: Sequence[Task], locked: Mapping[str, tup
 
 @functools.cache
 def load_timed_kernels(zones: bool = False, search: bool = True, paths: bool = False,
-                       large: bool = False) -> None:
+                       large: bool = False, few: bool = False) -> None:
     """Load the kernels of problems with time, compile those not on disk yet.
 
     Args:
@@ -165,15 +172,17 @@ def load_timed_kernels(zones: bool = False, search: bool = True, paths: bool = F
         search: False: only what a plan of no iterations needs.
         paths: those of problems with tasks that have a path, not of others.
         large: whether to load those that only searches of many tasks need, too.
+        few: whether to load those that only searches of few UAVs need, too.
     """
     first = TIMED_FIRST_WORK.plus(TIMED_ZONES_WORK if zones else NO_WORK)
-    large = large and search and not paths
-    rest = TIMED_SEARCH_WORK.plus(TIMED_LARGE_WORK if large else NO_WORK)
+    large, few = large and search and not paths, few and search and not paths
+    rest = TIMED_SEARCH_WORK.plus(TIMED_LARGE_WORK if large else NO_WORK).plus(
+        TIMED_FEW_WORK if few else NO_WORK)
     with NOTICE.until_loaded(('timed', zones, paths), first, rest, search):
-        _call_kernels(zones, search, paths, large)
+        _call_kernels(zones, search, paths, large, few)
 
 
-def _call_kernels(zones: bool, search: bool, paths: bool, large: bool) -> None:
+def _call_kernels(zones: bool, search: bool, paths: bool, large: bool, few: bool) -> None:
     """Solve a small problem, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0), turnaround=1.0), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0), latest=99.0) for i in range(5))
@@ -190,6 +199,11 @@ def _call_kernels(zones: bool, search: bool, paths: bool, large: bool) -> None:
     if search and not paths:
         best_label(problem.arrays, empty_timed_routes(problem.arrays), 0,
                    empty_labels(len(tasks), 1), 1.0, 1.0)
+    if few:
+        base, none = problem.base.arrays, np.full(len(uavs), -1)
+        pool = empty_pool(base)
+        reduced, _ = reduced_costs(base, pool, none, 0.0, 0.0)
+        pack_routes(problem.arrays, pool, reduced, 1.0, 1, none)
     if large:
         search_of_many = Intensifier(problem, problem.arrays)
         routes, scratch = empty_timed_routes(problem.arrays), empty_round(problem.arrays)
