@@ -102,7 +102,7 @@ def _next_choice(reduced: Reduced, columns: Ints, p: Packing, depth: int, spare:
 @inline_kernel
 def _go_deeper(reduced: Reduced, columns: Ints, uavs: Ints, p: Packing, depth: int,
                spare: float) -> int:
-    """Keep for the next depth what fits beside the choice; returns the columns read. O(c).
+    """Keep for the next depth what fits beside the choice; returns the words read. O(c).
 
     Of UAVs that are alike the first one flies the column that comes first.
     """
@@ -122,7 +122,7 @@ def _go_deeper(reduced: Reduced, columns: Ints, uavs: Ints, p: Packing, depth: i
             count += 1
     p.fitting[then], p.next_choice[then] = count, 0
     _set_least(reduced, columns, uavs, p, then)
-    return i
+    return i * int(p.tasks.shape[1]) + count
 
 
 @inline_kernel
@@ -154,12 +154,12 @@ def choose_columns(pool: Pool, reduced: Reduced, columns: Ints, uavs: Ints, clas
         classes: (m) class of each UAV of the fleet; those of one may fly each other's columns.
         tasks: int64 task nodes.
         spare: [m] the reduced cost has to be less.
-        limit: columns read, about.
+        limit: words read of the columns' sets of tasks, about; a word has 64 tasks.
         flown: column of each UAV, -1: none; is changed.
         uav_of: UAV by node, -1: unassigned; is changed.
 
     Returns:
-        Whether the cost fell, and how many columns were read.
+        Whether the cost fell, and how many words were read.
     """
     left = 0.0
     for t in tasks:

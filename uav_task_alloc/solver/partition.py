@@ -20,7 +20,8 @@ from uav_task_alloc.solver.routes import TINY, Floats, Ints
 Flags = NDArray[np.bool_]
 MANY_LEFT_OUT = 0.05  # share of tasks from which on columns are chosen UAV by UAV
 MAX_TRIES = 20_000  # columns that are tried at most
-MAX_READS = 4_000_000  # columns that `choose_columns` reads at most
+MAX_READS = 4_000_000  # words that `choose_columns` reads at most
+TRY_COST, READ_COST = 4.0, 5.0  # work of a try, of a word read, in stops read
 _INSERTION = 15  # items from which quicksort splits
 UNTRIED, UNSERVED = -1, -2  # instead of a column: nothing tried yet; the task is not served
 
@@ -319,7 +320,8 @@ def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: 
         left_out += uav_of[t] < 0
     if uavs.size <= MOST_PACKED and left_out > MANY_LEFT_OUT * tasks.size:
         return choose_columns(pool, reduced, columns, uavs, np.arange(group.size), tasks, spare,
-                              min(MAX_READS, limit), flown, uav_of)
+                              min(MAX_READS, int(limit * TRY_COST / READ_COST)), flown,
+                              uav_of)
     branches = _branches(pool, columns, tasks, uav_of.size)
     return _branch_and_bound(pool, reduced, group, branches, spare, min(MAX_TRIES, limit), flown,
                              uav_of)

@@ -6,7 +6,7 @@ import numpy as np
 
 from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel, inner_kernel, kernel
 from uav_task_alloc.solver.multipliers import Reduced, reduced_costs
-from uav_task_alloc.solver.partition import Flags, repartition
+from uav_task_alloc.solver.partition import TRY_COST, Flags, repartition
 from uav_task_alloc.solver.pool import Pool, collect, column_of
 from uav_task_alloc.solver.routes import (
     NODE,
@@ -22,7 +22,6 @@ from uav_task_alloc.solver.routes import (
 GROUP_SIZE = 10  # UAVs
 _NEAR_TASKS = 6  # neighbours of a task that make two routes adjacent
 PASSES = 2  # over all groups
-TRY_COST = 4.0  # work of a try, in stops read
 
 
 @inner_allocating_kernel

@@ -12,11 +12,11 @@ from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.packing import MOST_PACKED
 from uav_task_alloc.solver.pool import MAX_COLUMNS
-from uav_task_alloc.solver.problem import Rules
+from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.timed import columns as at
-from uav_task_alloc.solver.timed.colony import SELECTION, TimedColony
+from uav_task_alloc.solver.timed.colony import COLD, SELECTION, TimedColony
 from uav_task_alloc.solver.timed.order import route_order
-from uav_task_alloc.solver.timed.problem import empty_timed_routes
+from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
 from uav_task_alloc.solver.timed.recombine import cost_of_route
 from uav_task_alloc.solver.timed.route_pool import (
     collect_routes,
@@ -32,7 +32,7 @@ WORK = 1e8
 
 
 def pool_of(problem, seen):
-    pool = route_pool(problem.arrays, problem.base.arrays, True)
+    pool = route_pool(problem.base.arrays, True)
     for routes in seen:
         collect_routes(problem.arrays, routes, pool)
     return pool
@@ -143,9 +143,15 @@ def test_it_is_for_few_uavs_single_trips_and_costs_that_add_up_by_route():
             (fleet[:2], work, {'trips': 2}, False),
             (fleet[:2], work, {'objective': Objective(finish=1.0)}, False)):
         problem = timed(uavs, tasks, **rules)
-        pool = route_pool(problem.arrays, problem.base.arrays, True)
-        assert (pool.uav.size > 0) == expected
         assert may_combine(uavs, tasks, Rules(**rules)) == expected
-        assert route_pool(problem.arrays, problem.base.arrays, False).uav.size == 0
-        collect_routes(problem.arrays, set_routes(problem, {'u0': ['t1']}), pool)
-        assert pool.size[0] == expected
+        assert _collects(problem, SELECTION) == expected
+        assert not _collects(problem, COLD)
+    locked = make_timed(make_problem(fleet[:2], line, {'u0': (line[-1],)}, Limits(), Rules()), {})
+    assert not _collects(locked, SELECTION)
+
+
+def _collects(problem, params):
+    """Whether a search with these parameters collects its routes."""
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 0, params)
+    collect_routes(problem.arrays, set_routes(problem, {'u0': ['t1']}), colony._pool)
+    return bool(colony._pool.size[0] > 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from uav_task_alloc.solver.timed.problem import (
     empty_timed_routes,
 )
 from uav_task_alloc.solver.timed.rebuild import rebuild
-from uav_task_alloc.solver.timed.route_pool import combined, route_pool
+from uav_task_alloc.solver.timed.route_pool import combined, may_combine, route_pool
 from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
 
@@ -67,7 +68,7 @@ COLD = TimedParams(intensifies=True)
 # where many tasks have to be left out: the choice of tasks, more than their order
 SELECTION = TimedParams(coolings=((0.0, 60.0), (0.6, 6.0)), end_temperature=1.3,
                         pool_coolings=((0.0, 60.0), (0.25, 60.0), (0.45, 60.0), (0.65, 60.0),
-                                       (0.85, 10.0), (0.98, 1.3)),
+                                       (0.85, 10.0), (0.95, 1.3)),
                         short_end_temperature=1.3, ruin=10.0, skipped=0.3, by_value=0.3,
                         least_price=10.0, by_gaps=True, by_labels=True, first_price=math.inf)
 WARM = TimedParams(coolings=((0.0, 0.3),), end_temperature=0.02,
@@ -100,7 +101,9 @@ class TimedColony:
         self.routes = empty_timed_routes(self.arrays)
         set_order(self.arrays, self.routes, start.order)
         self._begin, self._base = begin, problem.base.arrays
-        self._pool = route_pool(self.arrays, self._base, bool(params.pool_coolings))
+        held = chain.from_iterable(problem.base.locked.values())
+        self._pool = route_pool(self._base, bool(params.pool_coolings) and may_combine(
+            problem.base.uavs, (*problem.base.tasks, *held), problem.base.rules))
         self._coolings = params.pool_coolings if self._pool.uav.size else params.coolings
         self._price, self._flown = arrays.price, 0
         self._gains = 1  # improvements, from when on excess is allowed

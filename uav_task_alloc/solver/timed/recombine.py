@@ -13,9 +13,9 @@ import numpy as np
 
 from uav_task_alloc.kernel import allocating_kernel, inline_kernel, inner_kernel, kernel
 from uav_task_alloc.solver.multipliers import Reduced, reduced_costs
-from uav_task_alloc.solver.partition import Flags, repartition
+from uav_task_alloc.solver.partition import TRY_COST, Flags, repartition
 from uav_task_alloc.solver.pool import Pool, empty_pool, new_column, slot_of_key
-from uav_task_alloc.solver.recombine import GROUP_SIZE, PASSES, TRY_COST
+from uav_task_alloc.solver.recombine import GROUP_SIZE, PASSES
 from uav_task_alloc.solver.routes import TINY, Arrays, Ints
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TimedArrays, TimedRoutes

@@ -6,7 +6,7 @@ belongs to the UAV that flew it first; those that are alike may fly each other's
 """
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -14,10 +14,9 @@ from uav_task_alloc.kernel import allocating_kernel, inner_kernel
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.solver.multipliers import Reduced, reduced_costs
 from uav_task_alloc.solver.packing import MOST_PACKED, choose_columns
-from uav_task_alloc.solver.partition import MAX_READS, candidates
+from uav_task_alloc.solver.partition import MAX_READS, READ_COST, candidates
 from uav_task_alloc.solver.pool import Pool, empty_pool, new_column, slot_of_key
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.recombine import TRY_COST
 from uav_task_alloc.solver.routes import TINY, Arrays, Ints
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TimedArrays, TimedRoutes
@@ -25,28 +24,26 @@ from uav_task_alloc.solver.timed.recombine import cost_of_route
 from uav_task_alloc.solver.timed.route_sums import is_infeasible
 
 
-def may_combine(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules) -> bool:
+def may_combine(uavs: Sequence[Uav], tasks: Iterable[Task], rules: Rules) -> bool:
     """Return whether routes of a problem with these UAVs and tasks may be combined.
 
     Args:
         uavs: the fleet.
-        tasks: all of them.
+        tasks: all of them, locked ones included.
         rules: objective, trips.
     """
-    return (1 < len(uavs) <= MOST_PACKED and len(tasks) > len(uavs) and rules.trips == 1
-            and rules.objective.finish == 0.0 and not any(task.path for task in tasks))
+    return (1 < len(uavs) <= MOST_PACKED and rules.trips == 1 and rules.objective.finish == 0.0
+            and not any(task.path for task in tasks))
 
 
-def route_pool(a: TimedArrays, base: Arrays, combines: bool) -> Pool:
+def route_pool(base: Arrays, combines: bool) -> Pool:
     """A pool without columns; without room, too, where none are combined.
 
     Args:
-        a: the problem.
-        base: arrays of the same problem without time.
-        combines: whether routes may be combined.
+        base: arrays of the problem without time.
+        combines: whether routes are combined.
     """
-    if (combines and 1 < a.uavs <= MOST_PACKED and a.visits == 0 and a.paths.ndim == 1
-            and a.weight[at.BY_FINISH] == 0.0):
+    if combines:
         return empty_pool(base)
     none = np.empty(0, np.int64)
     return Pool(np.empty(0, np.uint64), none, np.empty(0, np.uint64), none, np.empty(0), none,
@@ -92,7 +89,7 @@ def pack_routes(a: TimedArrays, pool: Pool, reduced: Reduced, spare: float, limi
         pool: the columns.
         reduced: their reduced costs.
         spare: [m]
-        limit: columns read, about.
+        limit: words read, about, as for `choose_columns`.
         flown: (m) column of each UAV, -1: none; is changed if there are any.
 
     Returns:
@@ -140,7 +137,7 @@ def combined(a: TimedArrays, base: Arrays, r: TimedRoutes, pool: Pool,
     reduced.stay[:] = most[a.class_of]
     flown = np.full(a.uavs, -1)
     if worth - bound < TINY or not pack_routes(
-            a, pool, reduced, worth - bound - TINY, min(MAX_READS, int(work / TRY_COST)), flown):
+            a, pool, reduced, worth - bound - TINY, min(MAX_READS, int(work / READ_COST)), flown):
         return None
     return [pool.stops[pool.first[e]:pool.first[e + 1]].tolist() if e >= 0 else []
             for e in flown.tolist()]
