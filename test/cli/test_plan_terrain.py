@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`plan --terrain` raises legs over the ground, and refuses tasks below it."""
+import time
 from dataclasses import replace
 from itertools import pairwise
 
@@ -81,7 +82,8 @@ def test_a_zone_above_a_ridge_is_flown_around_or_the_task_left_out(shape, reache
 
     def solve(some):
         return plan([uav], [timed.task for timed in some.tasks], [
-            timed.zone for timed in some.zones], budget=0.02, seed=1, clearance=some.clearance)
+            timed.zone for timed in some.zones], budget=0.2, seed=1, clearance=some.clearance,
+                    clock=time.thread_time)
 
     flat = solve(loaded)
     assert flat.legs['uav_1'][0].via == ()  # below the zone
@@ -110,7 +112,8 @@ uavs:
 
     def solve(some):
         return plan(uavs, [timed.task for timed in some.tasks], [
-            timed.zone for timed in some.zones], budget=0.02, seed=1, clearance=some.clearance)
+            timed.zone for timed in some.zones], budget=0.2, seed=1, clearance=some.clearance,
+                    clock=time.thread_time)
 
     flat = solve(loaded)
     assert flat.routes['uav_1'] == ('hut',)  # it is nearer, but for the ridge
