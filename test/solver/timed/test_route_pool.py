@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pool of a search of few UAVs: the best combination of what was seen, UAVs alike or not."""
-import math
-from itertools import combinations
-
 import numpy as np
 import pytest
 from test_tails import names, set_routes, timed
-from test_timed_recombine import some_routes, two_bases
+from test_timed_recombine import least_cost, some_routes, two_bases
 
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
@@ -44,19 +41,12 @@ def cost(problem, routes):
 
 
 def cheapest(problem, pool):
-    """The least cost of columns without a common task, of no class more than it has UAVs."""
-    a, least, members = problem.arrays, math.inf, np.diff(problem.arrays.first_member)
-    rows = [(pool.cost[e], int(a.class_of[pool.uav[e]]),
-             frozenset((pool.stops[pool.first[e]:pool.first[e + 1]] - a.uavs).tolist()))
-            for e in range(pool.size[0])]
-    for count in range(a.uavs + 1):
-        for chosen in combinations(rows, count):
-            served = frozenset[int]().union(*(row[2] for row in chosen))
-            used = np.bincount([row[1] for row in chosen], minlength=len(members))
-            if len(served) == sum(len(row[2]) for row in chosen) and (used <= members).all():
-                least = min(least, sum(row[0] for row in chosen) + sum(
-                    a.unserved[i] for i in range(a.ends - a.uavs) if i not in served))
-    return least
+    """The least cost of the columns of a pool."""
+    a = problem.arrays
+    return least_cost(problem, [
+        (pool.cost[e], int(a.class_of[pool.uav[e]]),
+         frozenset((pool.stops[pool.first[e]:pool.first[e + 1]] - a.uavs).tolist()))
+        for e in range(pool.size[0])])
 
 
 def flown(problem, found):

@@ -60,13 +60,12 @@ def cost(problem, routes):
             + routes.sums[at.UNSERVED_COST])
 
 
-def cheapest(problem, timed_pool):
-    """The least cost of columns without a common task, of no class more than it has UAVs."""
-    a, pool, least = problem.arrays, timed_pool.pool, math.inf
-    rows = [(pool.cost[e], int(timed_pool.class_of[e]),
-             frozenset((pool.stops[pool.first[e]:pool.first[e + 1]] - a.ends).tolist()))
-            for e in range(pool.size[0])]
-    members = np.diff(a.first_member)
+def least_cost(problem, rows):
+    """The least cost of columns without a common task, of no class more than it has UAVs.
+
+    rows: of each column its cost, class and tasks by index.
+    """
+    a, least, members = problem.arrays, math.inf, np.diff(problem.arrays.first_member)
     for count in range(a.uavs + 1):
         for chosen in combinations(rows, count):
             served = frozenset[int]().union(*(row[2] for row in chosen))
@@ -75,6 +74,15 @@ def cheapest(problem, timed_pool):
                 least = min(least, sum(row[0] for row in chosen) + sum(
                     a.unserved[i] for i in range(a.ends - a.uavs) if i not in served))
     return least
+
+
+def cheapest(problem, timed_pool):
+    """The least cost of the columns of a pool."""
+    pool, ends = timed_pool.pool, problem.arrays.ends
+    return least_cost(problem, [
+        (pool.cost[e], int(timed_pool.class_of[e]),
+         frozenset((pool.stops[pool.first[e]:pool.first[e + 1]] - ends).tolist()))
+        for e in range(pool.size[0])])
 
 
 @pytest.mark.parametrize('seed', range(6))

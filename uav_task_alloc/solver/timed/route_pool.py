@@ -113,20 +113,7 @@ def _cost_over_empty(a: TimedArrays, r: TimedRoutes) -> float:
 
 def combined(a: TimedArrays, base: Arrays, r: TimedRoutes, pool: Pool,
              work: float) -> list[list[int]] | None:
-    """A combination of the columns that costs less than these routes; None: not found.
-
-    Reads about `work` stops for a bound, and as many again in the search. O(work).
-
-    Args:
-        a: the problem.
-        base: arrays of the same problem without time.
-        r: the best routes.
-        pool: the columns.
-        work: stops of the pool to be read.
-
-    Returns:
-        Task nodes by UAV.
-    """
+    """As `recombined`, of the columns of such a pool: all UAVs at once. O(work)."""
     worth = _cost_over_empty(a, r)
     reduced, bound = reduced_costs(base._replace(unassigned_cost=a.unserved), pool,
                                    np.full(a.uavs, -1), worth, work)
