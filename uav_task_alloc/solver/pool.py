@@ -89,21 +89,25 @@ def _cost(a: Arrays, r: Routes, u: int) -> float:
 
 
 @inline_kernel
-def new_column(pool: Pool, tasks: int) -> int:
-    """Add a column without stops. O(1).
+def new_column(pool: Pool, slot: int, tasks: int) -> int:
+    """Add a column without stops; a full pool is emptied instead. O(1), or O(columns).
 
     Args:
         pool: the columns.
+        slot: index in the hash table of its key.
         tasks: number of its stops.
 
     Returns:
-        The column; -1: the pool is full.
+        The column; -1: the pool was full.
     """
     e = pool.size[0]
     if e == pool.uav.size or pool.first[e] + tasks > pool.stops.size:
+        pool.size[0] = 0
+        pool.table[:] = -1
         return -1
     pool.size[0] += 1
     pool.first[e + 1] = pool.first[e] + tasks
+    pool.table[slot] = e
     return int(e)
 
 
@@ -117,12 +121,9 @@ def collect(a: Arrays, r: Routes, pool: Pool) -> None:
         slot = slot_of_key(pool, key)
         e = pool.table[slot]
         if e < 0:
-            e = new_column(pool, r.tasks[u])
+            e = new_column(pool, slot, r.tasks[u])
             if e < 0:
-                pool.size[0] = 0
-                pool.table[:] = -1
                 return
-            pool.table[slot] = e
         elif (pool.cost[e] <= cost + TINY  # or, once in 2^64, a hash collision
                 or pool.first[e + 1] - pool.first[e] != r.tasks[u]):
             continue

@@ -74,12 +74,9 @@ def collect_timed(a: TimedArrays, r: TimedRoutes, timed: TimedPool) -> bool:
         slot = slot_of_key(pool, key)
         e = pool.table[slot]
         if e < 0:
-            e = new_column(pool, tasks)
+            e = new_column(pool, slot, tasks)
             if e < 0:
-                pool.size[0] = 0
-                pool.table[:] = -1
                 return False
-            pool.table[slot] = e
         elif pool.first[e + 1] - pool.first[e] != tasks:  # once in 2^64, a hash collision
             continue
         elif pool.cost[e] <= cost + TINY:

@@ -63,12 +63,10 @@ def collect_routes(a: TimedArrays, r: TimedRoutes, pool: Pool) -> None:
         slot, cost = slot_of_key(pool, key), cost_of_route(a, r, u)
         e = pool.table[slot]
         if e < 0:
-            e = new_column(pool, tasks)
+            e = new_column(pool, slot, tasks)
             if e < 0:
-                pool.size[0] = 0
-                pool.table[:] = -1
                 return
-            pool.table[slot], pool.uav[e] = e, u
+            pool.uav[e] = u
         elif (pool.cost[e] <= cost + TINY  # or, once in 2^64, a hash collision
                 or pool.first[e + 1] - pool.first[e] != tasks):
             continue
