@@ -29,6 +29,7 @@ from uav_task_alloc.nodes.conversions.messages import (
 from uav_task_alloc.nodes.ros.bag_recorder import BagRecorder
 from uav_task_alloc.nodes.ros.run import with_flags
 from uav_task_alloc.record.bag_reader import BagReader
+from uav_task_alloc.record.run_state import RunState
 
 pytestmark = pytest.mark.ros
 ADD = announcement(m.TaskAnnouncement.ADD, [Task('t1', (10.0, 20.0, 30.0), value=4.0)], 5.0)
@@ -153,8 +154,14 @@ def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp
             m.TaskStatus.ASSIGNED, m.TaskStatus.UNASSIGNED]
     probe.until(settled)
     reason = statuses[-1].statuses[1].reason
-    size = path.stat().st_size
-    probe.until(lambda: path.stat().st_size > size)
+
+    def recorded():  # the topics do not arrive in the order of their publication
+        run = RunState()
+        for line in BagReader(path):
+            run.apply(line)
+        return run.changing and 'uav_1' in run.lists and run.lists['uav_1']['tasks'] and any(
+            row.reason == reason for row in run.statuses.values())
+    probe.until(recorded)
     view.stop()
     allocator.stop()
     assert report.main([str(path), '--html', str(tmp_path / 'alone.html')]) == 0

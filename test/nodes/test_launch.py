@@ -131,7 +131,8 @@ def flies_to_its_end(probe, path):
     assert (left.state, 'pop_up' in left.reason) == (m.TaskStatus.UNASSIGNED, True)
     assert set(states) == {uav.id for uav in played.uavs}
     for uav in played.uavs:  # a flight of 300 s takes a part of what it can fly
-        assert 0.0 < states[uav.id].range_remaining < uav.range
+        least_flown = 0.0 if uav.id == 'uav_3' else 1.0  # it may die before it sets out
+        assert 0.0 < states[uav.id].range_remaining <= uav.range - least_flown
         assert states[uav.id].range_remaining == pytest.approx(  # as estimated from the flight;
             uav.range * states[uav.id].battery, rel=0.2)  # the file as it was is 25 % off
     modes = {m.UavState.HOLD, m.UavState.STANDBY}  # one that never flew is on the ground
