@@ -19,7 +19,8 @@ import numpy as np
 
 from uav_task_alloc import Separation
 from uav_task_alloc.separation.conflicts import find_conflicts
-from uav_task_alloc.separation.volumes import Flight, FlightLeg, flight_volumes
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg
+from uav_task_alloc.separation.volumes import flight_volumes
 
 STEP = 0.1  # [s]
 

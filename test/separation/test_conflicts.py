@@ -8,7 +8,8 @@ import pytest
 
 from uav_task_alloc import Separation
 from uav_task_alloc.separation.conflicts import AcceptedRows, find_conflicts
-from uav_task_alloc.separation.volumes import Flight, FlightLeg, flight_volumes, rows_of_legs
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg
+from uav_task_alloc.separation.volumes import flight_volumes, rows_of_legs
 
 RULE = Separation(10.0, 5.0, 0.0, 0.0)
 STEP = 0.1  # [s] of the judge

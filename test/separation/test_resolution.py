@@ -9,9 +9,10 @@ import pytest
 from uav_task_alloc import Separation
 from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.separation.conflicts import find_conflicts
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg, leg_times
 from uav_task_alloc.separation.leg_changes import TransitLimits
 from uav_task_alloc.separation.resolution import flight_seconds, resolve
-from uav_task_alloc.separation.volumes import Flight, FlightLeg, flight_volumes, leg_times
+from uav_task_alloc.separation.volumes import flight_volumes
 
 RULE = Separation(10.0, 5.0, 2.0)
 FAR = 400.0  # [m]

@@ -7,7 +7,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.state.fleet import UavRecord, above_reserve
-from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight, finish_time
+from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point

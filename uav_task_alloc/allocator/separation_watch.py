@@ -14,7 +14,8 @@ from dataclasses import replace
 from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.state.fleet import UavRecord
-from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight, timed_stops
+from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.stop_times import timed_stops
 from uav_task_alloc.allocator.state.way_times import timed_points
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import Allocation, TaskRecord, TaskState
-from uav_task_alloc.allocator.state.flight_pace import finish_time
+from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.works import Works
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text

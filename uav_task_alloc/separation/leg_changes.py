@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.model import Point
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg, leg_times
 from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.separation.transit_paths import slanted, upright
-from uav_task_alloc.separation.volumes import Flight, FlightLeg, leg_times
 
 _LAYERS = 10  # above the ends of a leg, at most
 _PRICE = 0.15  # [s/m] of a climb above the ends of a leg, whose power a wait does not take

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from uav_task_alloc.separation.conflicts import AcceptedRows, FoundConflict, find_conflicts
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg, LegTimes, leg_times
 from uav_task_alloc.separation.leg_changes import (
     LegChange,
     TransitLimits,
@@ -21,14 +22,10 @@ from uav_task_alloc.separation.leg_changes import (
 )
 from uav_task_alloc.separation.rule import Conflict, Separation
 from uav_task_alloc.separation.volumes import (
-    Flight,
-    FlightLeg,
-    LegTimes,
     PieceRow,
     end_rows,
     flight_volumes,
     leg_rows,
-    leg_times,
     meeting_place,
     rows_of_legs,
 )

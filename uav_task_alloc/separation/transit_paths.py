@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from uav_task_alloc.model import Point
-from uav_task_alloc.separation.volumes import Flight, FlightLeg
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg
 
 _STEEP = 0.45  # share of the first and last straight part that a slanted climb may take
 

@@ -17,17 +17,11 @@ from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import Leg, Plan, Task, Uav, turned_tasks
 from uav_task_alloc.objective import Objective, excess, fit, response_time
 from uav_task_alloc.separation.conflicts import load_separation_kernels
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg, LegTimes, leg_times
 from uav_task_alloc.separation.leg_changes import TransitLimits
 from uav_task_alloc.separation.resolution import Resolution, resolve
 from uav_task_alloc.separation.rule import Conflict, Separation
-from uav_task_alloc.separation.volumes import (
-    Flight,
-    FlightLeg,
-    LegTimes,
-    flight_volumes,
-    leg_times,
-    meeting_place,
-)
+from uav_task_alloc.separation.volumes import flight_volumes, meeting_place
 from uav_task_alloc.solver.problem import Limits, Rules
 from uav_task_alloc.solver.warm import WarmState
 from uav_task_alloc.timetable import Timetable

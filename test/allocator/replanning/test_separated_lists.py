@@ -14,7 +14,8 @@ from uav_task_alloc.allocator.replanning.task_lists import build_task_list
 from uav_task_alloc.model import Leg, Task, Uav
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.conflicts import find_conflicts
-from uav_task_alloc.separation.volumes import flight_volumes, leg_times
+from uav_task_alloc.separation.flight_legs import leg_times
+from uav_task_alloc.separation.volumes import flight_volumes
 
 ON = {'separation__horizontal': 10.0, 'separation__vertical': 5.0, 'separation__time': 2.0}
 SPEEDS = {'cruise_speed': 10.0, 'climb_speed': 2.5, 'descent_speed': 1.5}

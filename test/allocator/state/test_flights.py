@@ -13,8 +13,8 @@ from uav_task_alloc.allocator.state.flight_pace import (
     UavFlight,
     measured_stop,
     stopping,
-    timed_stops,
 )
+from uav_task_alloc.allocator.state.stop_times import timed_stops
 from uav_task_alloc.allocator.state.wind import WindEstimate
 from uav_task_alloc.geometry.flight_time import flight_time
 from uav_task_alloc.model import Leg, Task, Uav

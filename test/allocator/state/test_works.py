@@ -8,7 +8,7 @@ from allocation import AllocatorDriver, as_plan
 
 from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.records import AnnouncementAction
-from uav_task_alloc.allocator.state.flight_pace import way_ahead
+from uav_task_alloc.allocator.state.stop_times import way_ahead
 from uav_task_alloc.allocator.status import health_values, status_of_work
 from uav_task_alloc.model import Leg, Task, ThreatZone
 from uav_task_alloc.work.pieces import Work

@@ -21,7 +21,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
 from uav_task_alloc.mavlink.mission.flown_path import FlownPath, PositionSample
-from uav_task_alloc.mavlink.mission.upload import UploadState
+from uav_task_alloc.mavlink.mission.upload_states import UploadState
 
 C = (200.0, 100.0, 50.0)
 MISSION = 3  # custom_mode of the copter

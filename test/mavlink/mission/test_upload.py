@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.mavlink.mission import upload as machine
 from uav_task_alloc.mavlink.mission.outcomes import Failed, Mission, Verified
-from uav_task_alloc.mavlink.mission.upload import UploadState
+from uav_task_alloc.mavlink.mission.upload_states import UploadState
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 

@@ -4,7 +4,7 @@ import pytest
 from mission_bench import UploadBench, ack, drop, request, verified
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.mission.upload import UploadState
+from uav_task_alloc.mavlink.mission.upload_states import UploadState
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 

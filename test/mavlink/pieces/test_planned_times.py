@@ -9,7 +9,8 @@ from piece_bench import TRIGGER, list_of, strip
 
 from uav_task_alloc.actions import LASTING, Action
 from uav_task_alloc.allocator.list_records import ListStop
-from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight, timed_stops
+from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.stop_times import timed_stops
 from uav_task_alloc.mavlink.action_commands import ARDUCOPTER_ACTIONS, PX4_ACTIONS
 from uav_task_alloc.model import Leg, Task, Uav
 

@@ -15,14 +15,9 @@ from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, node_count
 from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
+from uav_task_alloc.solver.timed.round import begin_round, empty_round
 from uav_task_alloc.solver.timed.route_sums import cost_of
-from uav_task_alloc.solver.timed.ruin import (
-    begin_round,
-    empty_round,
-    insert_removed,
-    list_absent,
-    ruin_strings,
-)
+from uav_task_alloc.solver.timed.ruin import insert_removed, list_absent, ruin_strings
 from uav_task_alloc.solver.timed.tails import exchange_tails
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState

@@ -20,16 +20,15 @@ from uav_task_alloc.solver.timed.insertion import near_place, unlink
 from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
-from uav_task_alloc.solver.timed.route_sums import cost_of
-from uav_task_alloc.solver.timed.ruin import (
+from uav_task_alloc.solver.timed.round import (
     REMOVED,
     begin_round,
     empty_round,
-    insert_removed,
-    ruin_strings,
     save_route,
     take_back,
 )
+from uav_task_alloc.solver.timed.route_sums import cost_of
+from uav_task_alloc.solver.timed.ruin import insert_removed, ruin_strings
 from uav_task_alloc.solver.timed.segments import update
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState

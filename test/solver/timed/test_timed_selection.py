@@ -18,14 +18,8 @@ from uav_task_alloc.solver.timed.insertion import _within_reach
 from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
-from uav_task_alloc.solver.timed.ruin import (
-    REMOVED,
-    begin_round,
-    empty_round,
-    insert_removed,
-    list_absent,
-    ruin_strings,
-)
+from uav_task_alloc.solver.timed.round import REMOVED, begin_round, empty_round
+from uav_task_alloc.solver.timed.ruin import insert_removed, list_absent, ruin_strings
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState
 

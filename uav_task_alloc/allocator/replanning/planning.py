@@ -23,10 +23,10 @@ from uav_task_alloc.allocator.replanning.held_deadlines import (
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, repaired_routes
 from uav_task_alloc.allocator.replanning.task_lists import LegKey, build_task_list, planned_legs
 from uav_task_alloc.allocator.replanning.trips import present_trips, waiting_uavs, with_later_trips
-from uav_task_alloc.allocator.state.flight_pace import way_ahead
 from uav_task_alloc.allocator.state.flights import top_of
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
+from uav_task_alloc.allocator.state.stop_times import way_ahead
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav

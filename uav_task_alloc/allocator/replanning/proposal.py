@@ -12,7 +12,7 @@ from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, exchange_groups
 from uav_task_alloc.allocator.replanning.planning import BuiltLists, build_lists
-from uav_task_alloc.allocator.state.flight_pace import finish_time
+from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.model import Plan

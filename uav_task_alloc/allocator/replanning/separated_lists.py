@@ -10,15 +10,16 @@ from itertools import count
 from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.planning import BuiltLists
-from uav_task_alloc.allocator.state.flight_pace import UavFlight, slower_along, timed_stops
+from uav_task_alloc.allocator.state.flight_pace import UavFlight
+from uav_task_alloc.allocator.state.stop_times import slower_along, timed_stops
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.model import Leg, Point
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg, leg_times
 from uav_task_alloc.separation.leg_changes import TransitLimits
 from uav_task_alloc.separation.prediction import rule_to_go_on
 from uav_task_alloc.separation.resolution import STOPPED, Resolution, resolve
 from uav_task_alloc.separation.rule import Separation
-from uav_task_alloc.separation.volumes import Flight, FlightLeg, leg_times
 
 _MOST_CHANGES = 10_000  # tried in a plan, so that a callback ends: half a second without zones
 _CHANGES = 20_000  # tried for each second of `solve_budget`, where the next plan goes on

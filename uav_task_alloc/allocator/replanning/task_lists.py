@@ -8,8 +8,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.list_records import ListStop, UavList
-from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops, way_ahead
+from uav_task_alloc.allocator.state.flight_pace import UavFlight
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
+from uav_task_alloc.allocator.state.stop_times import timed_stops, way_ahead
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 

@@ -15,7 +15,7 @@ from uav_task_alloc.allocator.replan_records import FleetOutlook
 from uav_task_alloc.allocator.replanning.from_now import objective_of, separation_of
 from uav_task_alloc.allocator.replanning.planning import way_to_place_is_clear
 from uav_task_alloc.allocator.state.fleet import UavRecord
-from uav_task_alloc.allocator.state.flight_pace import finish_time
+from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point

@@ -6,7 +6,8 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
 from uav_task_alloc.allocator.list_records import ListStop, UavList
-from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
+from uav_task_alloc.allocator.state.flight_pace import UavFlight
+from uav_task_alloc.allocator.state.stop_times import timed_stops
 
 
 class PublishedLists:

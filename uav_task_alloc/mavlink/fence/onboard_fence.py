@@ -16,7 +16,8 @@ from uav_task_alloc.mavlink.mission.horizon import SPACE_TEXT
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.outcomes import Downloaded, Failed, Mission, Verified
 from uav_task_alloc.mavlink.mission.peer import Peer
-from uav_task_alloc.mavlink.mission.upload import Upload, UploadState
+from uav_task_alloc.mavlink.mission.upload import Upload
+from uav_task_alloc.mavlink.mission.upload_states import UploadState
 from uav_task_alloc.mavlink.transport.codec import Message
 
 ItemKey = tuple[int, float, int, int]  # command, p1, x, y

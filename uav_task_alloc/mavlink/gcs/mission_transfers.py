@@ -7,7 +7,7 @@ from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessage
 from uav_task_alloc.mavlink.gcs.end_of_list import EndOfList
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
-from uav_task_alloc.mavlink.mission.upload import UploadState
+from uav_task_alloc.mavlink.mission.upload_states import UploadState
 
 
 class MissionTransfers:

@@ -20,8 +20,8 @@ from uav_task_alloc.solver.timed.problem import (
     empty_timed_routes,
 )
 from uav_task_alloc.solver.timed.rebuild import rebuild
+from uav_task_alloc.solver.timed.round import empty_round
 from uav_task_alloc.solver.timed.route_pool import combined, may_combine, route_pool
-from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
 
 LEAST_PRICE, MOST_PRICE = 0.1, 100.0  # of excess, over the first price

@@ -15,7 +15,7 @@ from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes, n
 from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.problem import TimedProblem
 from uav_task_alloc.solver.timed.recombine import collect_timed, empty_timed_pool, recombined
-from uav_task_alloc.solver.timed.ruin import Round
+from uav_task_alloc.solver.timed.round import Round
 from uav_task_alloc.solver.timed.search import Incumbent
 from uav_task_alloc.solver.timed.tails import exchange_tails
 from uav_task_alloc.solver.timed.warm import fill_routes, no_routes

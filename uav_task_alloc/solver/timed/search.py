@@ -22,19 +22,10 @@ from uav_task_alloc.solver.timed.arrays import (
     node_count,
 )
 from uav_task_alloc.solver.timed.order import route_order, true_cost
+from uav_task_alloc.solver.timed.round import ABSENT, PATIENCE, Round, begin_round, take_back
 from uav_task_alloc.solver.timed.route_pool import collect_routes
 from uav_task_alloc.solver.timed.route_sums import cost_of
-from uav_task_alloc.solver.timed.ruin import (
-    ABSENT,
-    PATIENCE,
-    Round,
-    begin_round,
-    insert_removed,
-    list_absent,
-    open_route,
-    ruin_strings,
-    take_back,
-)
+from uav_task_alloc.solver.timed.ruin import insert_removed, list_absent, open_route, ruin_strings
 from uav_task_alloc.solver.timed.ways import has_paths
 
 MAX_OPENING = 64  # absent tasks that a round tries to insert that opens a route

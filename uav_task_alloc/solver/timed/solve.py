@@ -39,8 +39,8 @@ from uav_task_alloc.solver.timed.labels import best_label, empty_labels
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes, make_timed
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
+from uav_task_alloc.solver.timed.round import empty_round
 from uav_task_alloc.solver.timed.route_pool import may_combine, pack_routes
-from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import BEST_WORTH, FEW_ABSENT, Incumbent
 from uav_task_alloc.solver.timed.warm import completed, first_plan
 from uav_task_alloc.solver.warm import WarmState

@@ -14,8 +14,8 @@ from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.insertion import idle_uav
 from uav_task_alloc.solver.timed.legs import join, leg_of
+from uav_task_alloc.solver.timed.round import Round, begin_round, save_route, take_back
 from uav_task_alloc.solver.timed.route_sums import cost_of
-from uav_task_alloc.solver.timed.ruin import Round, begin_round, save_route, take_back
 from uav_task_alloc.solver.timed.segments import update
 
 
