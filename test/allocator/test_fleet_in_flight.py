@@ -79,9 +79,10 @@ class SimulatedFleet:
             self.active[uav_id] = ''
 
     def planned(self):
-        """Tasks that no list has, and metres: the less, the better."""
+        """The ids of the tasks in all lists, and their length [m]."""
         lists = self.driver.world.lists.lists.values()
-        return -sum(len(each.task_ids) for each in lists), sum(each.distance for each in lists)
+        return ({task for each in lists for task in each.task_ids},
+                sum(each.distance for each in lists))
 
     def check(self, problem, before, planned):
         """No task is listed twice; the one under way stays; small gains change nothing."""
@@ -95,7 +96,9 @@ class SimulatedFleet:
                 assert lists[uav_id].task_ids[:1] == (active,)
         changed = [u for u, first in before.items() if lists[u].task_ids[:1] != first and first]
         if problem.background and changed:
-            self.weak += [] if self.planned() < planned else [(planned, self.planned())]
+            (old, length), (new, now) = planned, self.planned()  # it serves more, or is shorter
+            self.weak += [] if now < length or new - old else [
+                (problem.trigger, length, now, old - new)]
 
     def until_done(self, limit=2000):
         for _ in range(limit):

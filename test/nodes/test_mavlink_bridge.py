@@ -71,6 +71,9 @@ class Sky:
     def on_state(self, msg):
         self.states[msg.uav_id] = msg
 
+    def until(self, condition, timeout=60.0):
+        self.probe.until(condition, timeout, lambda: '\n'.join(map(str, self.states.values())))
+
     def send(self, n, revision, names, **fields):
         """Tasks 60 m from each other, each at the place of its name."""
         tasks = [planned_task(ListStop(Task(f'u{n}_{k}', (60.0 * k, 40.0 + 40.0 * n, 50.0)),
@@ -122,11 +125,11 @@ def test_lists_are_flown_and_replaced_in_flight_and_every_task_is_reported_once(
         world.send(n, 1, [0, 1, 2, 3])
     flying = set(KINDS)
     while flying:  # each at once: a listed task that was flown is reported again
-        probe.until(lambda: any(map(world.completed, flying)))
+        world.until(lambda: any(map(world.completed, flying)))
         for n in [n for n in flying if world.completed(n)]:
             world.send(n, 2, [3, 5, 2])
             flying.remove(n)
-    probe.until(lambda: all(f'u{n}_2' in world.completed(n) for n in KINDS))
+    world.until(lambda: all(f'u{n}_2' in world.completed(n) for n in KINDS))
     world.land()
     for n in KINDS:
         assert world.completed(n) == world.flown(n)
@@ -142,17 +145,17 @@ def test_a_bridge_killed_and_restarted_flies_no_task_twice(sky, probe, moment, t
     world = sky('-p', f'state_dir:={tmp_path}/state')
     for n in KINDS:
         world.send(n, 1, [0, 1, 2, 3, 4])
-    probe.until(lambda: all(f'u{n}_1' in world.completed(n) for n in KINDS))
+    world.until(lambda: all(f'u{n}_1' in world.completed(n) for n in KINDS))
     if moment == 'upload':
         for n in KINDS:
             world.send(n, 2, [4, 3, 2])
-        probe.until(lambda: any(s.mission_state == m.UavState.UPLOADING
+        world.until(lambda: any(s.mission_state == m.UavState.UPLOADING
                                 or s.list_revision == 2 for s in world.states.values()))
     world.bridge.stop(signal.SIGKILL)
     world.receive_rest()
     before = {n: set(world.completed(n)) for n in KINDS}
     world.again()
-    probe.until(lambda: all({f'u{n}_{k}' for k in range(5)} <= set(world.completed(n))
+    world.until(lambda: all({f'u{n}_{k}' for k in range(5)} <= set(world.completed(n))
                             for n in KINDS), 60.0)
     if moment == 'flight':
         assert [world.fact(n, 'uploads') for n in KINDS] == ['0', '0']  # nothing differed
@@ -167,18 +170,18 @@ def test_what_was_flown_while_the_bridge_was_dead_is_not_flown_again(sky, probe,
     world = sky('-p', f'state_dir:={tmp_path}/state')
     for n in KINDS:
         world.send(n, 1, [0, 1, 2])
-    probe.until(lambda: all(f'u{n}_0' in world.completed(n) for n in KINDS))
+    world.until(lambda: all(f'u{n}_0' in world.completed(n) for n in KINDS))
     world.bridge.stop(signal.SIGKILL)
-    probe.until(lambda: all(len(world.flown(n)) == 3 for n in KINDS))
+    world.until(lambda: all(len(world.flown(n)) == 3 for n in KINDS))
     for n in KINDS:
         world.send(n, 2, [])  # an allocator that received nothing gives them up
     world.again()
     for n in KINDS:
         world.send(n, 3, [2, 3, 1])
     # it holds for a reason that the bridge did not see
-    probe.until(lambda: world.states['uav_2'].authority == m.UavState.LOST)
-    probe.until(lambda: hand_over(probe, 'uav_2')[0])
-    probe.until(lambda: all({f'u{n}_{k}' for k in range(4)} == set(world.completed(n))
+    world.until(lambda: world.states['uav_2'].authority == m.UavState.LOST)
+    world.until(lambda: hand_over(probe, 'uav_2')[0])
+    world.until(lambda: all({f'u{n}_{k}' for k in range(4)} == set(world.completed(n))
                             for n in KINDS), 60.0)
     world.land()
     for n in KINDS:
@@ -193,20 +196,20 @@ def hand_over(probe, uav_id, operator='anna'):
 
 def test_a_uav_that_landed_is_flown_again_after_a_hand_over(sky, probe):
     world = sky('-p', 'when_empty:=return')
-    probe.until(lambda: all(s.authority == m.UavState.HELD for s in world.states.values()))
+    world.until(lambda: all(s.authority == m.UavState.HELD for s in world.states.values()))
     world.send(1, 1, [0, 1], end=m.TaskList.RETURN_HOME)
-    probe.until(lambda: world.states['uav_1'].authority == m.UavState.NONE, 90.0)
+    world.until(lambda: world.states['uav_1'].authority == m.UavState.NONE, 90.0)
     assert world.completed(1) == ['u1_0', 'u1_1']
     assert not world.states['uav_1'].available
     assert '~/hand_over' in world.states['uav_1'].reason
     assert world.states['uav_2'].authority == m.UavState.HELD
     for _ in range(2):  # at least a second later, when its heartbeat says that it is disarmed
         assert world.fact(1, 'authority') == 'NONE'
-    probe.until(lambda: hand_over(probe, 'uav_1')[0])
+    world.until(lambda: hand_over(probe, 'uav_1')[0])
     assert 'hand_over of uav_1 by anna: the bridge has uav_1 now' in world.bridge.output()
-    probe.until(lambda: world.states['uav_1'].available)
+    world.until(lambda: world.states['uav_1'].available)
     world.send(1, 2, [2], end=m.TaskList.RETURN_HOME)
-    probe.until(lambda: 'u1_2' in world.completed(1), 60.0)
+    world.until(lambda: 'u1_2' in world.completed(1), 60.0)
 
 
 def test_a_hand_over_that_is_refused_says_why(sky, probe):
@@ -225,25 +228,25 @@ def test_a_pilot_takes_a_uav_and_the_other_gets_its_tasks(sky, probe, start):
     work = [Task(f't{k}', (20.0, 300.0 + 100.0 * k, 50.0)) for k in range(4)]
     work.append(Task('only', (20.0, 250.0, 50.0), allowed_uavs=frozenset({'uav_1'})))
     announce.publish(announcement(m.TaskAnnouncement.ADD, work, 1.0))
-    probe.until(lambda: world.states['uav_1'].active_task_id == 'only', 60.0)
+    world.until(lambda: world.states['uav_1'].active_task_id == 'only', 60.0)
     with world.fleet._lock:
         assert world.fleet.vehicles['uav_1'].rc_mode(5)  # LOITER, by the switch
-    probe.until(lambda: world.states['uav_1'].authority == m.UavState.LOST)
+    world.until(lambda: world.states['uav_1'].authority == m.UavState.LOST)
     assert not world.states['uav_1'].available
     assert 'LOITER' in world.states['uav_1'].reason
-    probe.until(lambda: set(world.completed(2)) == {f't{k}' for k in range(4)}, 90.0)
+    world.until(lambda: set(world.completed(2)) == {f't{k}' for k in range(4)}, 90.0)
     assert '-> LOITER' in world.bridge.output()
 
 
 def test_authority_persists_over_a_restart_of_the_bridge(sky, probe, tmp_path):
     world = sky('-p', f'state_dir:={tmp_path}/state')
     world.send(1, 1, [0, 1], end=m.TaskList.RETURN_HOME)
-    probe.until(lambda: world.states['uav_1'].authority == m.UavState.NONE, 90.0)
+    world.until(lambda: world.states['uav_1'].authority == m.UavState.NONE, 90.0)
     assert sorted(path.name for path in (tmp_path / 'state').glob('*.json')) == [
         'authority_uav_1.json', 'authority_uav_2.json']
     world.bridge.stop(signal.SIGKILL)
     world.again()
-    probe.until(lambda: world.states['uav_2'].authority == m.UavState.HELD)
+    world.until(lambda: world.states['uav_2'].authority == m.UavState.HELD)
     assert world.states['uav_1'].authority == m.UavState.NONE  # else it would take off again
     assert world.fact(1, 'authority_why') == 'landed'
 
@@ -253,7 +256,7 @@ def test_a_corrupt_authority_file_is_reported(sky, probe, tmp_path):
     path.write_text('{')
     world = sky('-p', f'state_dir:={tmp_path}')
     assert f'{path}: Expecting' in world.bridge.output()
-    probe.until(lambda: world.states['uav_1'].authority == m.UavState.HELD)
+    world.until(lambda: world.states['uav_1'].authority == m.UavState.HELD)
 
 
 def test_a_bad_zone_is_refused_with_one_warning(sky, probe):
@@ -264,15 +267,15 @@ def test_a_bad_zone_is_refused_with_one_warning(sky, probe):
     array.zones[0].radius = -1.0
     for _ in range(3):
         zones.publish(array)
-    probe.until(lambda: 'threat_zones: zone z: radius = -1.0' in world.bridge.output())
+    world.until(lambda: 'threat_zones: zone z: radius = -1.0' in world.bridge.output())
     world.send(1, 1, [0])
-    probe.until(lambda: world.completed(1) == ['u1_0'])
+    world.until(lambda: world.completed(1) == ['u1_0'])
     assert world.bridge.output().count('radius = -1.0') == 1
 
 
 def test_finding_38_each_uav_has_its_own_range(sky, probe):
     world = sky('-p', "full_ranges:=['uav_1:6000', 'uav_3:1']", '-p', 'full_range:=9000.0')
-    probe.until(lambda: all(state.battery > 0.9 for state in world.states.values()))
+    world.until(lambda: all(state.battery > 0.9 for state in world.states.values()))
     for n, most in ((1, 6000.0), (2, 9000.0)):
         state = world.states[f'uav_{n}']
         assert state.range_remaining == pytest.approx(most * state.battery, rel=1e-3)
@@ -281,7 +284,7 @@ def test_finding_38_each_uav_has_its_own_range(sky, probe):
 def test_the_limits_of_single_uavs_are_in_their_states(sky, probe):
     world = sky('-p', "uav_limits:=['uav_1:endurance=900,climb_speed=4,turnaround=60']", '-p',
                 'full_range:=9000.0')
-    probe.until(lambda: all(state.battery > 0.9 for state in world.states.values()))
+    world.until(lambda: all(state.battery > 0.9 for state in world.states.values()))
     one, two = world.states['uav_1'], world.states['uav_2']
     assert one.endurance == pytest.approx(900.0 * one.battery, rel=1e-3)
     assert (one.climb_speed, one.turnaround, one.full_range) == (4.0, 60.0, 9000.0)
@@ -291,7 +294,7 @@ def test_the_limits_of_single_uavs_are_in_their_states(sky, probe):
 
 def test_states_carry_what_the_allocator_plans_with(sky, probe):
     world = sky('-p', 'full_range:=20000.0', '-p', "capabilities:=['uav_1:camera,thermal']")
-    probe.until(lambda: world.states['uav_1'].home.x == pytest.approx(20.0, abs=0.1)
+    world.until(lambda: world.states['uav_1'].home.x == pytest.approx(20.0, abs=0.1)
                 and world.states['uav_1'].battery > 0.9)
     one, two = world.states['uav_1'], world.states['uav_2']
     assert one.position.x == pytest.approx(20.0, abs=0.1)
@@ -305,14 +308,14 @@ def test_states_carry_what_the_allocator_plans_with(sky, probe):
 def test_a_bad_list_is_refused_with_a_reason_and_changes_nothing(sky, probe):
     world = sky()
     world.send(1, 1, [0, 1])
-    probe.until(lambda: world.states['uav_1'].list_revision == 1)
+    world.until(lambda: world.states['uav_1'].list_revision == 1)
     bad = planned_task(ListStop(Task('far', (0.0, 0.0, 50.0)), Leg((), 1.0), 0.0))
     bad.task.position.x = float('nan')
     world.lists[1].publish(m.TaskList(uav_id='uav_1', revision=2, tasks=[bad]))
-    probe.until(lambda: 'three finite coordinates' in world.bridge.output())
+    world.until(lambda: 'three finite coordinates' in world.bridge.output())
     world.lists[1].publish(m.TaskList(uav_id='uav_2', revision=2))
-    probe.until(lambda: "uav_id = 'uav_2': expected uav_1" in world.bridge.output())
-    probe.until(lambda: world.completed(1) == ['u1_0', 'u1_1'])
+    world.until(lambda: "uav_id = 'uav_2': expected uav_1" in world.bridge.output())
+    world.until(lambda: world.completed(1) == ['u1_0', 'u1_1'])
     assert world.states['uav_1'].list_revision == 1
 
 
@@ -320,7 +323,7 @@ def test_diagnostics_name_each_uav_and_its_mission(sky, probe):
     world = sky()
     arrays = world.health
     world.send(2, 1, [0, 1])
-    probe.until(lambda: any(s.hardware_id == 'uav_2' and 'VERIFIED' in s.message
+    world.until(lambda: any(s.hardware_id == 'uav_2' and 'VERIFIED' in s.message
                             for array in arrays for s in array.status))
     details = {v.key: v.value for s in arrays[-1].status if s.hardware_id == 'uav_2'
                for v in s.values}
