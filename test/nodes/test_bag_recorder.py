@@ -158,7 +158,7 @@ def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp
     def recorded():  # the topics do not arrive in the order of their publication
         run = RunState()
         for line in BagReader(path):
-            run.apply(line)
+            run.apply({'wall': 0.0, **line})
         return run.changing and 'uav_1' in run.lists and run.lists['uav_1']['tasks'] and any(
             row.reason == reason for row in run.statuses.values())
     probe.until(recorded)
