@@ -282,3 +282,25 @@ def test_a_late_message_of_before_a_reboot_does_not_hide_who_set_a_mode(kind):
     hidden.clear()
     assert bench.reaches(L, 6.0)
     assert sends_no_command(bench)
+
+
+@BOTH
+def test_a_mode_set_once_a_heartbeat_has_shown_the_one_of_the_boot_is_of_a_pilot(kind):
+    bench = on_ground(kind, H)
+    clocks, heartbeats = [], []
+    bench.line.tampers.append(lambda direction, m, now: [] if direction == 'down' and (
+        (clocks and hasattr(m, 'time_boot_ms')) or (heartbeats and m.get_type() == 'HEARTBEAT')
+    ) else None)
+    bench.run(limit=20.0)
+    clocks.append(True)
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=2.5)
+    assert bench.authority() is H
+    clocks.clear()  # the reboot is seen after two heartbeats of the new boot
+    heartbeats.append(True)
+    assert bench.run(lambda: any('was restarted' in note for note in bench.notes), 3.0)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    bench.run(limit=0.5)
+    heartbeats.clear()
+    assert bench.reaches(L, 8.0)
+    assert sends_no_command(bench)

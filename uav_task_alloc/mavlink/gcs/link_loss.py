@@ -12,6 +12,8 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import (
 )
 from uav_task_alloc.mavlink.gcs.telemetry import STALE
 
+_HEARTBEAT_PERIOD = 1.0  # [s]; one received later than that after a boot was sent after it
+
 
 class LinkLoss:
     """Detects changes of mode and arming that no heartbeat has shown.
@@ -81,7 +83,9 @@ class LinkLoss:
         state.apply(AuthorityEvent.REBOOTED_FLOWN if state.flown else AuthorityEvent.REBOOTED, now,
                     'the vehicle rebooted')
         if not state.authority.suspended_by(Suspension.LINK):
-            state.unconfirmed = True
+            # no mode that it has entered by itself, if a heartbeat has shown the one it booted in
+            state.unconfirmed = not (state.authority.held and (
+                state.heartbeat_at > state.telemetry.booted_at + _HEARTBEAT_PERIOD))
         elif not state.flown:
             state.unconfirmed = False
             state.apply(AuthorityEvent.LINK_BACK, now,
