@@ -34,6 +34,7 @@ from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
 from uav_task_alloc.mavlink.gcs.takeoff import Takeoff
 from uav_task_alloc.mavlink.gcs.task_events import passed_over, task_events
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.telemetry_messages import HEALTH_REPORTS
 from uav_task_alloc.mavlink.gcs.vehicle_energy import VehicleEnergy
 from uav_task_alloc.mavlink.gcs.vehicle_fence import FenceMemory, VehicleFence
 from uav_task_alloc.mavlink.mission.first_leg import LegStart
@@ -203,6 +204,8 @@ class MissionExecutor:
         if message.get_type() == 'COMMAND_ACK' and self._peer.is_from_vehicle(message):
             self.watch.receive_command_ack(message, self.telemetry.frame)
         self._messages.receive(message, newest, now)
+        if not out and message.get_type() in HEALTH_REPORTS:
+            return []
         return self._gate(out + self._act(now), now)
 
     def step(self, now: float) -> list[Message]:

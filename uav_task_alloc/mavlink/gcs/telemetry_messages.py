@@ -19,6 +19,9 @@ STATE_REPORTS = frozenset({
     'HEARTBEAT', 'GLOBAL_POSITION_INT', 'HOME_POSITION', 'BATTERY_STATUS', 'SYS_STATUS',
     'EXTENDED_SYS_STATE', 'MISSION_CURRENT', 'GPS_RAW_INT', 'EKF_STATUS_REPORT',
     'ESTIMATOR_STATUS'})
+# those that say nothing of the flight itself: it is early enough to act on them at the next step
+HEALTH_REPORTS = frozenset({
+    'BATTERY_STATUS', 'SYS_STATUS', 'GPS_RAW_INT', 'EKF_STATUS_REPORT', 'ESTIMATOR_STATUS'})
 # ids of all that the bridge reads
 WANTED = frozenset({*RATES, *ESTIMATE.values(), *(
     getattr(d, 'MAVLINK_MSG_ID_' + name) for name in (
