@@ -156,10 +156,11 @@ def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp
     reason = statuses[-1].statuses[1].reason
 
     def recorded():  # the topics do not arrive in the order of their publication
+        settled()  # else the UAV is given up
         run = RunState()
         for line in BagReader(path):
             run.apply({'wall': 0.0, **line})
-        return run.changing and 'uav_1' in run.lists and run.lists['uav_1']['tasks'] and any(
+        return run.solves and 'uav_1' in run.lists and run.lists['uav_1']['tasks'] and any(
             row.reason == reason for row in run.statuses.values())
     probe.until(recorded)
     view.stop()
