@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from pymavlink.dialects.v20 import ardupilotmega as d
+
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, Suspension
 from uav_task_alloc.mavlink.gcs.authority_watch_state import (
     EXPLANATION_TIME,
@@ -83,12 +85,19 @@ class LinkLoss:
         state.apply(AuthorityEvent.REBOOTED_FLOWN if state.flown else AuthorityEvent.REBOOTED, now,
                     'the vehicle rebooted')
         if not state.authority.suspended_by(Suspension.LINK):
-            # no mode that it has entered by itself, if a heartbeat has shown the one it booted in
-            state.unconfirmed = not (state.authority.held and (
-                state.heartbeat_at > state.telemetry.booted_at + _HEARTBEAT_PERIOD))
+            state.unconfirmed = not self._has_shown_boot_mode()
         elif not state.flown:
             state.unconfirmed = False
             state.apply(AuthorityEvent.LINK_BACK, now,
                         'the vehicle rebooted, and was never armed')
         state.sent.clear_pending()
         state.descending = state.was_airborne = state.mission_on_ground = False
+
+    def _has_shown_boot_mode(self) -> bool:
+        """Whether a heartbeat since the boot, which is over, has shown the mode after it.
+
+        Another mode later is set by somebody.
+        """
+        state = self._state
+        return (state.authority.held and state.status >= d.MAV_STATE_STANDBY
+                and state.heartbeat_at > state.telemetry.booted_at + _HEARTBEAT_PERIOD)
