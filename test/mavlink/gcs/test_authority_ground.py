@@ -6,6 +6,7 @@ from authority_bench import (
     BOTH,
     COPTER,
     MODES,
+    PX4,
     AuthorityBench,
     H,
     L,
@@ -19,6 +20,7 @@ from authority_bench import (
     set_mode,
     status_is,
 )
+from findings_bench import drop_messages
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -284,23 +286,48 @@ def test_a_late_message_of_before_a_reboot_does_not_hide_who_set_a_mode(kind):
     assert sends_no_command(bench)
 
 
-@BOTH
-def test_a_mode_set_once_a_heartbeat_has_shown_the_one_of_the_boot_is_of_a_pilot(kind):
-    bench = on_ground(kind, H)
-    clocks, heartbeats = [], []
+def late_reboot(kind, before=()):
+    """A bench whose vehicle has rebooted, as seen after two heartbeats; no heartbeat follows."""
+    bench, clocks, heartbeats = on_ground(kind, H), [], []
     bench.line.tampers.append(lambda direction, m, now: [] if direction == 'down' and (
         (clocks and hasattr(m, 'time_boot_ms')) or (heartbeats and m.get_type() == 'HEARTBEAT')
     ) else None)
     bench.run(limit=20.0)
     clocks.append(True)
     bench.vehicles[1].reboot(bench.now)
+    for mode in before:  # that of its switch, entered while it boots
+        bench.vehicles[1].rc_mode(mode)
     bench.run(limit=2.5)
-    assert bench.authority() is H
-    clocks.clear()  # the reboot is seen after two heartbeats of the new boot
+    clocks.clear()
     heartbeats.append(True)
     assert bench.run(lambda: any('was restarted' in note for note in bench.notes), 3.0)
-    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.authority() is H
+    return bench, heartbeats
+
+
+@pytest.mark.parametrize(('kind', 'boots_in_another'), [
+    ('ardupilot', False), ('px4', False), ('px4', True)])
+def test_a_mode_set_once_a_heartbeat_has_shown_the_one_of_the_boot_is_of_a_pilot(
+        kind, boots_in_another):
+    stick = MODES[kind].stick
+    bench, heartbeats = late_reboot(kind, (stick,) * boots_in_another)
+    bench.vehicles[1].rc_mode(MODES[kind].land if boots_in_another else stick)
     bench.run(limit=0.5)
     heartbeats.clear()
     assert bench.reaches(L, 8.0)
+    assert sends_no_command(bench)
+
+
+@PX4
+def test_armed_by_a_pilot_between_a_reboot_and_the_next_heartbeat_it_is_lost(kind):
+    bench, heartbeats = on_ground(kind, H), []
+    drop_messages(bench, 'down', 'HEARTBEAT', lambda m: heartbeats)
+    bench.run(limit=20.0)
+    heartbeats.append(True)
+    bench.vehicles[1].reboot(bench.now)
+    assert bench.run(lambda: any('was restarted' in note for note in bench.notes), 2.5)
+    bench.vehicles[1].rc_arm(True)
+    bench.run(limit=0.3)
+    heartbeats.clear()
+    assert bench.reaches(L, 3.0)
     assert sends_no_command(bench)

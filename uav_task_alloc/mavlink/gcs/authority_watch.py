@@ -132,7 +132,7 @@ class AuthorityWatch:
         self._save_record()
 
     def step(self, now: float) -> None:
-        """Apply what depends on time and telemetry; called after each message too."""
+        """Apply what depends on time and telemetry; called after most messages too."""
         self._link.step(now)
         self._restart.step(now)
         self._modes.resolve(now)

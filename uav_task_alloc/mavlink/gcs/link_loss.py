@@ -7,6 +7,7 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, Suspension
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch_state import (
     EXPLANATION_TIME,
     AuthorityWatchState,
@@ -14,7 +15,7 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import (
 )
 from uav_task_alloc.mavlink.gcs.telemetry import STALE
 
-_HEARTBEAT_PERIOD = 1.0  # [s]; one received later than that after a boot was sent after it
+_HEARTBEAT_DELAY = 1.0  # [s]; one received later than that after a boot was sent after it
 
 
 class LinkLoss:
@@ -61,6 +62,9 @@ class LinkLoss:
         state = self._state
         if not state.authority.suspended_by(Suspension.LINK):
             state.unconfirmed = False
+            if state.authority.held and state.armed and not state.flown and (
+                    now > state.sent.arm_until):  # no vehicle boots armed
+                state.apply(AuthorityEvent.ARMED_BY_OTHER, now, 'armed, not by the bridge')
             return
         if (state.mode in self._modes and state.armed in self._armed) or (
                 state.booting and not (state.flown or state.armed)):
@@ -94,10 +98,11 @@ class LinkLoss:
         state.descending = state.was_airborne = state.mission_on_ground = False
 
     def _has_shown_boot_mode(self) -> bool:
-        """Whether a heartbeat since the boot, which is over, has shown the mode after it.
+        """Whether a heartbeat sent after the boot has shown the mode; another has set a later one.
 
-        Another mode later is set by somebody.
+        While it reports that it boots, its mode is not final.
         """
         state = self._state
-        return (state.authority.held and state.status >= d.MAV_STATE_STANDBY
-                and state.heartbeat_at > state.telemetry.booted_at + _HEARTBEAT_PERIOD)
+        return (state.authority.state in (AuthorityState.HELD, AuthorityState.SUSPENDED)
+                and state.status >= d.MAV_STATE_STANDBY
+                and state.heartbeat_at > state.telemetry.booted_at + _HEARTBEAT_DELAY)
