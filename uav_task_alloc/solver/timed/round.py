@@ -64,6 +64,21 @@ def begin_round(r: TimedRoutes, w: Round) -> None:
 
 
 @inline_kernel
+def _copy_node(a: TimedArrays, of: TimedRoutes | Round, k: int, to: TimedRoutes | Round,
+               i: int) -> None:
+    """Copy the node at k of one to i of the other, without its trip. O(1)."""
+    for c in range(4):
+        to.link[i, c] = of.link[k, c]
+    if has_paths(a):
+        to.way[i, 0], to.way[i, 1] = of.way[k, 0], of.way[k, 1]
+    for c in range(at.RATE):
+        to.row[i, c] = of.row[k, c]
+    if a.whole or a.timed_cost:
+        for c in range(at.RATE, at.ROW_COLUMNS):
+            to.row[i, c] = of.row[k, c]
+
+
+@inline_kernel
 def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
     """Save UAV u's route, once in a round. O(tasks)."""
     if w.saved_in[u] == w.counts[SERIAL]:
@@ -77,15 +92,7 @@ def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
     i, k, end = LINK(u), w.counts[SAVED], a.ends + u
     while True:
         w.node[k] = i
-        for c in range(4):
-            w.link[k, c] = r.link[i, c]
-        if has_paths(a):
-            w.way[k, 0], w.way[k, 1] = r.way[i, 0], r.way[i, 1]
-        for c in range(at.RATE):
-            w.row[k, c] = r.row[i, c]
-        if a.whole or a.timed_cost:
-            for c in range(at.RATE, at.ROW_COLUMNS):
-                w.row[k, c] = r.row[i, c]
+        _copy_node(a, r, i, w, k)
         if not is_task(a, i) and i != end:
             slot = slot_of(a, i)
             for c in range(at.TRIP_COLUMNS):
@@ -113,15 +120,7 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
             r.link[base, at.OF_UAV] = LINK(a.uavs)
     for k in range(w.counts[SAVED]):
         i = w.node[k]
-        for c in range(4):
-            r.link[i, c] = w.link[k, c]
-        if has_paths(a):
-            r.way[i, 0], r.way[i, 1] = w.way[k, 0], w.way[k, 1]
-        for c in range(at.RATE):
-            r.row[i, c] = w.row[k, c]
-        if a.whole or a.timed_cost:
-            for c in range(at.RATE, at.ROW_COLUMNS):
-                r.row[i, c] = w.row[k, c]
+        _copy_node(a, w, k, r, i)
         if is_task(a, i):
             set_reach(a, r, i)
         elif i < a.uavs or i >= a.bases:
