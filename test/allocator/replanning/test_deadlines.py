@@ -283,7 +283,7 @@ def test_a_uav_whose_battery_nobody_changes_is_no_longer_counted_on():
         made.world.request_replan('test', made.now)
         made.settle()
         assert made.state('t1') == state
-    assert made.reason('t1') == 'no UAV available'
+    assert made.reason('t1') == 'no UAV available: a is low on battery'
 
 
 @pytest.mark.parametrize('step', [500.0, -500.0])

@@ -64,7 +64,8 @@ def test_a_report_that_a_silent_uav_is_not_available_changes_nothing(driver):
 def test_when_all_are_silent_every_task_has_the_reason(driver):
     driver.settle(wait=6.0, report=False)
     assert driver.route('a') == driver.route('b') == ()
-    assert (driver.state('t1'), driver.reason('t1')) == ('UNASSIGNED', 'no UAV available')
+    assert (driver.state('t1'), driver.reason('t1')) == (
+        'UNASSIGNED', 'no UAV available: a is silent, b is silent')
     driver.uav('a', 0.0, 0.0, 50.0)
     driver.settle(report=False)
     assert set(driver.route('a')) == {'t1', 't2', 't3'}

@@ -11,8 +11,6 @@ from uav_task_alloc.allocator.state.tasks import without_failed
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 
-_NO_UAV = 'no UAV available'
-
 
 def task_steps(world: World, left_out: Mapping[str, str]) -> list[TaskStep]:
     """Return an event for each open task.
@@ -59,7 +57,7 @@ def _unlisted(record: TaskRecord, fleet: Fleet, usable: frozenset[str],
                            if may_fly(task, record.failed_on, uav.report))
     if not usable:
         return TaskStep(task.id, TaskTransition.LEAVE, why=_joined(
-            ordered, blocked or _NO_UAV))
+            ordered, blocked or fleet.why_none_usable()))
     others = without_failed(record, usable).allowed_uavs
     if record.failed_on and others is not None and others.isdisjoint(usable):
         why = f'failed on {", ".join(record.failed_on)}; no other UAV that may fly it is available'

@@ -8,10 +8,12 @@ from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.allocator.state.orders import Orders
+from uav_task_alloc.errors import first_of
 from uav_task_alloc.model import Point, Task, Uav
 from uav_task_alloc.params import AllocatorParams
 
 _FASTEST = 10.0  # times the cruise speed: faster is a jump, in accelerated simulations too
+_MAX_NAMED = 5  # UAVs in a reason
 LEAST_ENDURANCE = 1.0  # [s] of a UAV that has none left
 _RECHARGED = 0.1  # [0..1] above the reserve: a battery that was low is good again
 
@@ -192,6 +194,11 @@ class Fleet:
     def usable_ids(self) -> list[str]:
         """Return the UAVs that may be given tasks."""
         return [uav_id for uav_id in self.records if self.usable(uav_id)]
+
+    def why_none_usable(self) -> str:
+        """Return that no UAV may be given tasks, and why each of the first may not."""
+        why = [self.why_unusable(uav_id) for uav_id in sorted(self.records)]
+        return f'no UAV available: {first_of(why, _MAX_NAMED)}'
 
     def blocked_on_ground(self) -> list[UavRecord]:
         """Return those that would be usable, were they or their homes not inside a zone."""
