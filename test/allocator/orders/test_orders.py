@@ -263,9 +263,8 @@ def test_a_status_before_the_next_plan_names_no_order_that_was_taken_back(driver
     assert driver.order('FORBID', 'b', 't4').success
     driver.settle()
     assert driver.reason('t4') == (
-        'not b (order o3 of ann); no UAV available: '
-        'a has the order to return (order o1 of ann), b has the order to return '
-        '(order o2 of ann)')
+        'not b (order o3 of ann); no UAV available: a has the order to return (order o1 of ann), '
+        'b has the order to return (order o2 of ann)')
     assert driver.order('RESUME', 'a').success
     driver.core.tick(driver.now, driver.now)
     assert driver.reason('t4') == 'not b (order o3 of ann); waits for the next plan'
