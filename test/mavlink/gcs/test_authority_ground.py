@@ -19,6 +19,7 @@ from authority_bench import (
     sends_no_command,
     set_mode,
     status_is,
+    upload_by_another,
 )
 from findings_bench import drop_messages
 from mission_bench import task_list
@@ -331,3 +332,20 @@ def test_armed_by_a_pilot_between_a_reboot_and_the_next_heartbeat_it_is_lost(kin
     heartbeats.clear()
     assert bench.reaches(L, 3.0)
     assert sends_no_command(bench)
+
+
+@BOTH
+@pytest.mark.parametrize('flown', [False, True])
+def test_hold_set_by_another_on_the_ground_in_mission_mode_is_a_loss(kind, flown):
+    bench = on_ground(kind, L if flown else H)
+    upload_by_another(bench, items=2)
+    assert not flown or bench.hand_over() == ''
+    bench.from_station(set_mode(MODES[kind].mission, kind))
+    bench.run(limit=3.0)
+    assert bench.vehicles[1].flight.custom_mode == MODES[kind].mission
+    assert bench.authority() is H
+    bench.from_station(set_mode(MODES[kind].hold, kind))
+    assert bench.reaches(L, 8.0)
+    bench.assign(task_list('AB'))
+    assert sends_no_command(bench, 20.0)
+    assert status_is(bench, L)

@@ -173,6 +173,11 @@ class ModeChanges:
         elif telemetry.airborne and (was is ModeClass.MISSION or state.authority.held
                                      or avoids_traffic(self._family, before)):
             state.apply_taken(why, now)
+        elif was is ModeClass.MISSION and state.authority.held:  # on the ground
+            if state.flown or state.armed:
+                state.apply_taken(why, now)
+            else:  # as above: never armed, it may have rebooted
+                state.suspend_until_explained(self._rebooted_by(now), why, now)
 
     def _climb_ended(self, climb: float, now: float, why: str) -> None:
         """Apply the end of our take-off; below the height `climb` [m] something else ended it."""
