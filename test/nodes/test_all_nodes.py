@@ -49,7 +49,7 @@ class Fleet:
                                '-p', f'state_dir:={folder / "state"}')
         self.bridge = self.start_bridge()
         self.sim = start('fleet_sim', '-p', f'scenario:={folder / "pair.yaml"}',
-                         '-p', 'speedup:=20.0', '-p', f'target:=127.0.0.1:{self.port}',
+                         '-p', 'speedup:=8.0', '-p', f'target:=127.0.0.1:{self.port}',
                          '-p', f'log_file:={self.flight}')
         self.announce = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
 
@@ -61,12 +61,17 @@ class Fleet:
     def add(self, tasks):
         self.announce.publish(announcement(m.TaskAnnouncement.ADD, tasks, 1.0))
 
+    def until(self, condition, timeout=60.0):
+        self.probe.until(condition, timeout, lambda: '\n'.join(map(str, (
+            *{state.uav_id: state for state in self.states}.values(), *self.statuses[-1:],
+            self.allocator.output()[-2000:], self.bridge.output()[-2000:]))))
+
     def state_of(self, task):
         rows = self.statuses[-1].statuses if self.statuses else []
         return next((row.state for row in rows if row.task_id == task.id), None)
 
     def wait_for(self, tasks, state=m.TaskStatus.COMPLETED, timeout=60.0):
-        self.probe.until(lambda: all(self.state_of(task) == state for task in tasks), timeout)
+        self.until(lambda: all(self.state_of(task) == state for task in tasks), timeout)
 
     def visitors(self, task):
         """The vehicles that reached the item at a task, in order, by the simulator's log."""
@@ -87,48 +92,48 @@ def fleet(start, probe, tmp_path):
 
 def test_tasks_that_arrive_in_flight_are_flown_once_each_by_both_autopilots(fleet):
     fleet.add(BOTH)
-    fleet.probe.until(lambda: any(e.event == m.TaskEvent.COMPLETED for e in fleet.events), 60.0)
+    fleet.until(lambda: any(e.event == m.TaskEvent.COMPLETED for e in fleet.events), 60.0)
     fleet.add(LATE)
     fleet.wait_for(NEAR + LATE)
-    fleet.probe.until(lambda: all(fleet.visits(task) == 1 for task in NEAR + LATE))
+    fleet.until(lambda: all(fleet.visits(task) == 1 for task in NEAR + LATE))
     done = [e for e in fleet.events if e.event == m.TaskEvent.COMPLETED]
     assert sorted(e.task_id for e in done) == sorted(task.id for task in NEAR + LATE)
     assert {e.uav_id for e in done} == {'uav_1', 'uav_2'}
-    fleet.probe.until(  # a slow machine still uploads the list without the last task
+    fleet.until(  # a slow machine still uploads the list without the last task
         lambda: {s.mission_state for s in fleet.states[-20:]} == {m.UavState.VERIFIED})
 
 
 def test_a_bridge_killed_in_flight_comes_back_and_flies_no_task_twice(fleet):
     fleet.add(NEAR)
-    fleet.probe.until(lambda: any(e.event == m.TaskEvent.COMPLETED for e in fleet.events), 60.0)
+    fleet.until(lambda: any(e.event == m.TaskEvent.COMPLETED for e in fleet.events), 60.0)
     fleet.bridge.popen.kill()
     fleet.bridge.popen.wait()
     fleet.start_bridge()
     fleet.wait_for(NEAR)
-    fleet.probe.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
+    fleet.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
     assert [fleet.visits(task) for task in NEAR] == [1] * len(NEAR)
 
 
 def test_an_allocator_killed_in_flight_comes_back_and_loses_nothing(fleet, tmp_path):
     fleet.add(NEAR)
-    fleet.probe.until(lambda: any(e.event == m.TaskEvent.COMPLETED for e in fleet.events), 60.0)
+    fleet.until(lambda: any(e.event == m.TaskEvent.COMPLETED for e in fleet.events), 60.0)
     fleet.allocator.popen.kill()
     fleet.allocator.popen.wait()
     fleet.start('allocator', '-p', 'route_end:=hold', '-p', f'state_dir:={tmp_path / "state"}')
     fleet.wait_for(NEAR)
-    fleet.probe.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
+    fleet.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
     assert [fleet.visits(task) for task in NEAR] == [1] * len(NEAR)
 
 
 def test_the_tasks_of_a_uav_that_falls_silent_go_to_the_other(fleet):
     fleet.add(NEAR)
-    fleet.probe.until(lambda: any(s.uav_id == 'uav_2' and s.active_task_id
+    fleet.until(lambda: any(s.uav_id == 'uav_2' and s.active_task_id
                                   for s in fleet.states), 60.0)
     answer = fleet.probe.call(SetAvailability, 'fleet_sim/set_alive',
                               SetAvailability.Request(uav_id='uav_2', available=False))
     assert answer.success, answer.message
     fleet.wait_for(NEAR)
-    fleet.probe.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
+    fleet.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
     twice = [task.id for task in NEAR if fleet.visits(task) > 1]
     # at most what it had reached the moment before, which nobody received
     assert [fleet.visitors(task) for task in NEAR if task.id in twice] in (
