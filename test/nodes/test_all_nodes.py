@@ -128,7 +128,7 @@ def test_an_allocator_killed_in_flight_comes_back_and_loses_nothing(fleet, tmp_p
 def test_the_tasks_of_a_uav_that_falls_silent_go_to_the_other(fleet):
     fleet.add(NEAR)
     fleet.until(lambda: any(s.uav_id == 'uav_2' and s.active_task_id
-                                  for s in fleet.states), 60.0)
+                            for s in fleet.states), 60.0)
     answer = fleet.probe.call(SetAvailability, 'fleet_sim/set_alive',
                               SetAvailability.Request(uav_id='uav_2', available=False))
     assert answer.success, answer.message

@@ -43,8 +43,7 @@ def test_finding_24_the_publishers_of_a_forgotten_uav_are_destroyed(probe):
     def publish(outbox):
         publisher.enqueue(outbox)
         marker_publisher.update(outbox)
-        while publisher.publish_some(0.0):
-            pass  # a time slice at a time
+        probe.until(lambda: not publisher.publish_some(0.0))  # a time slice at a time
 
     def publishers(uav_id):
         return [probe.node.count_publishers(f'/{uav_id}/{topic}') for topic in (

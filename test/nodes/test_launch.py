@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 ROS2 = [shutil.which('ros2')] if shutil.which('ros2') else [
     sys.executable, str(ROOT / 'test/ros2_stand_in.py')]
 DEMO = (ROOT / 'config/scenarios/demo.yaml').read_text()
-END = 90.0  # [s] of the machine for a flight of about 300 s, 12 times faster
+END = 120.0  # [s] of the machine for a flight of about 300 s, 4 times faster
 
 
 class Launched:
@@ -76,17 +76,16 @@ def launch(domain, tmp_path):
 
 @pytest.fixture
 def moved(tmp_path):
-    """The demo at another place, faster, with other ranges; it ends with HOLD, as no default.
+    """The demo at another place, faster, with another range; it ends with HOLD, as no default.
 
-    The ranges last for minutes of the machine, in which a slow one may leave UAVs in the air.
+    Not much faster: while a slow machine is behind, UAVs use their batteries in the air.
     """
     text = DEMO
-    for old, new in (('route_end: hold', 'speedup: 12\nroute_end: hold'),
+    for old, new in (('route_end: hold', 'speedup: 4\nroute_end: hold'),
                      ('appears: 80', 'appears: 50'),  # long before a UAV comes there
                      ('latitude: 47.397742, longitude: 8.545594, altitude_amsl: 488.0',
                       'latitude: -33.9, longitude: 151.2, altitude_amsl: 40.0'),
-                     ('range: 6000', 'range: 18000'),
-                 ('position: [600, 0, 0], range: 18000', 'position: [600, 0, 0], range: 24000')):
+                     ('position: [600, 0, 0], range: 6000', 'position: [600, 0, 0], range: 8000')):
         assert old in text
         text = text.replace(old, new)
     path = tmp_path / 'moved.yaml'
@@ -122,7 +121,7 @@ def flies_to_its_end(probe, path):
         assert parameters(probe, node, 'origin.latitude', 'origin.longitude') == [-33.9, 151.2]
     assert parameters(probe, 'allocator', 'route_end') == ['hold']
     assert parameters(probe, 'mavlink_bridge', 'full_ranges') == [[
-        'uav_1:18000.0', 'uav_2:24000.0', 'uav_3:18000.0', 'uav_4:18000.0']]
+        'uav_1:6000.0', 'uav_2:8000.0', 'uav_3:6000.0', 'uav_4:6000.0']]
     wanted = {timed.task.id for timed in played.tasks} - {'t20'}
 
     def statuses():
@@ -140,9 +139,10 @@ def flies_to_its_end(probe, path):
     assert (left.state, 'pop_up' in left.reason) == (m.TaskStatus.UNASSIGNED, True)
     assert set(states) == {uav.id for uav in played.uavs}
     for uav in played.uavs:  # a flight of 300 s takes a part of what it can fly
-        assert states[uav.id].battery < 1.0 or uav.id == 'uav_3'  # it may die before it sets out
-        assert states[uav.id].range_remaining == pytest.approx(  # as estimated from the flight:
-            uav.range * states[uav.id].battery, rel=0.6)  # what a stalled bridge saw of it
+        least_flown = 0.0 if uav.id == 'uav_3' else 1.0  # it may die before it sets out
+        assert 0.0 < states[uav.id].range_remaining <= uav.range - least_flown
+        assert states[uav.id].range_remaining == pytest.approx(  # as estimated from the flight;
+            uav.range * states[uav.id].battery, rel=0.2)  # the file as it was is 25 % off
     modes = {m.UavState.HOLD, m.UavState.STANDBY}  # one that never flew is on the ground
     probe.until(lambda: {state.mode for name, state in states.items() if name != 'uav_3'}
                 <= modes, END)
@@ -169,9 +169,9 @@ def test_finding_37_a_fleet_flies_a_scenario_to_its_end_with_its_values(
         'uav_timeout': 2.0}}}))
     fleet = launch('fleet', scenario=moved, bridge_params=bridge_params,
                    allocator_params=allocator_params)
-    start('fleet_sim', '-p', f'scenario:={moved}', '-p', 'speedup:=8.0', '-p',
+    start('fleet_sim', '-p', f'scenario:={moved}', '-p', 'speedup:=4.0', '-p',
           f'target:=127.0.0.1:{port}')
-    start('scenario_player', '-p', f'scenario:={moved}', '-p', 'speedup:=8.0', '-p',
+    start('scenario_player', '-p', f'scenario:={moved}', '-p', 'speedup:=4.0', '-p',
           'wait_for_plan:=true')
     flies_to_its_end(probe, moved)
     assert fleet.stop() == 0, fleet.output()

@@ -103,7 +103,9 @@ class ModeChanges:
             state.descending = state.is_return(mode)
         elif was is ModeClass.MISSION and self._mission_may_have_ended(mode):
             state.suspend_until_explained(lambda t: self._mission_ended(mode, t), why, now)
-        elif new is ModeClass.HOLD:
+        elif new is ModeClass.HOLD and not (
+                was is ModeClass.MISSION and state.authority.held
+                and not state.telemetry.airborne):  # on the ground it is as any other mode
             self._hold_set(before, mode, now, why)
         elif not (state.flown or state.armed or state.is_return(mode)) and state.authority.held:
             # never armed: a reboot looks the same until a message with its clock is received,
@@ -173,11 +175,6 @@ class ModeChanges:
         elif telemetry.airborne and (was is ModeClass.MISSION or state.authority.held
                                      or avoids_traffic(self._family, before)):
             state.apply_taken(why, now)
-        elif was is ModeClass.MISSION and state.authority.held:  # on the ground
-            if state.flown or state.armed:
-                state.apply_taken(why, now)
-            else:  # as above: never armed, it may have rebooted
-                state.suspend_until_explained(self._rebooted_by(now), why, now)
 
     def _climb_ended(self, climb: float, now: float, why: str) -> None:
         """Apply the end of our take-off; below the height `climb` [m] something else ended it."""
