@@ -9,7 +9,7 @@ from plan_checks import check, make
 from uav_task_alloc import plan
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver.bidding import Bidding
-from uav_task_alloc.solver.colony import PHASES, RECOMBINED_COST, Colony, ColonyParams
+from uav_task_alloc.solver.colony import COOLINGS, RECOMBINED_COST, Colony, ColonyParams
 from uav_task_alloc.solver.pool import collect
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.rng import rng_state
@@ -59,7 +59,7 @@ def test_temperatures_fall_twice_and_then_stay_constant(monkeypatch):
     colony = Colony(PROBLEM, repair(PROBLEM, {}), 1, ColonyParams(scouts=0.0))
     calls, seen = [], []
     monkeypatch.setattr(colony, '_intensify', calls.append)
-    for begin, end in pairwise(PHASES):
+    for begin, end in pairwise([*(each.begin for each in COOLINGS), 1.0]):
         colony.fly(max(begin, 1e-6), 0.5 * (begin + end), 10)
         seen += [colony.temperature(share) / PROBLEM.scale
                  for share in (begin, 0.5 * (begin + end), end)]

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recombination: always consistent, and optimal where all combinations can be tried."""
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
-from plan_checks import random_problem, some_routes
+from plan_checks import make, random_problem, some_routes
 
 from uav_task_alloc.solver.multipliers import reduced_costs
 from uav_task_alloc.solver.pool import collect, column_of, empty_pool
-from uav_task_alloc.solver.recombine import GROUP_SIZE, recombine
+from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.recombine import GROUP_SIZE, classes_of, recombine, repack
 from uav_task_alloc.solver.routes import (
     DISTANCE,
     NODE,
@@ -32,12 +34,13 @@ def filled(problem, seen):
     return pool
 
 
-def cheapest(problem, pool):
+def cheapest(problem, pool, classes=None):
     """The cost of the best choice of one column or none for each UAV, by all of them."""
     a, rows = problem.arrays, [[(0.0, ())] for _ in range(problem.arrays.uavs)]
+    classes = np.arange(a.uavs) if classes is None else classes
     for e in range(pool.size[0]):
-        rows[pool.uav[e]].append((pool.cost[e], tuple(
-            pool.stops[pool.first[e]:pool.first[e + 1]])))
+        for u in np.flatnonzero(classes == classes[pool.uav[e]]):
+            rows[u].append((pool.cost[e], tuple(pool.stops[pool.first[e]:pool.first[e + 1]])))
     least = np.inf
     for chosen in product(*rows):
         stops = [t for _, row in chosen for t in row]
@@ -48,10 +51,15 @@ def cheapest(problem, pool):
     return least
 
 
+def of_few(a, best, pool, work, into):
+    return repack(a, best, pool, np.arange(a.uavs), work, into)
+
+
+@pytest.mark.parametrize('run', [recombine, of_few])
 @pytest.mark.parametrize('returns', [False, True])
 @pytest.mark.parametrize('leave', [0, 2])
 @pytest.mark.parametrize('seed', range(6))
-def test_it_finds_the_best_combination(seed, leave, returns):
+def test_it_finds_the_best_combination(seed, leave, returns, run):
     problem, rng = random_problem(3, 7, seed, returns=returns), np.random.default_rng(seed)
     a = problem.arrays
     a.unassigned_cost[:] = 500.0  # so that some tasks stay unassigned
@@ -60,7 +68,7 @@ def test_it_finds_the_best_combination(seed, leave, returns):
     optimum = cheapest(problem, pool)
     for best in seen[:4]:
         into = empty_routes(a)
-        if not recombine(a, best, pool, WORK, into):
+        if not run(a, best, pool, WORK, into):
             copy_into(best, into)
         assert total_cost(a, into) == pytest.approx(optimum + a.empty_route_length.sum())
         assert into.sums[DISTANCE] == pytest.approx(into.length.sum())
@@ -101,20 +109,56 @@ def test_tasks_moved_to_neighbouring_uavs_are_moved_back():
     assert (into.uav_of[a.uavs:a.ends] >= 0).all()
 
 
-def test_a_best_beyond_range_or_an_empty_pool_or_no_work_changes_nothing():
+@pytest.mark.parametrize('run', [recombine, of_few])
+def test_a_best_beyond_range_or_an_empty_pool_or_no_work_changes_nothing(run):
     problem, rng = random_problem(2, 6, reach=1.0), np.random.default_rng(1)
     into = empty_routes(problem.arrays)
     pool = empty_pool(problem.arrays)
-    assert not recombine(problem.arrays, some_routes(problem, rng), pool, WORK, into)
+    assert not run(problem.arrays, some_routes(problem, rng), pool, WORK, into)
     problem = random_problem(2, 3)
     nothing = empty_routes(problem.arrays)
-    assert not recombine(problem.arrays, nothing, empty_pool(problem.arrays), WORK, copy(nothing))
+    assert not run(problem.arrays, nothing, empty_pool(problem.arrays), WORK, copy(nothing))
     problem = random_problem(3, 9)
     seen = [some_routes(problem, rng) for _ in range(9)]
     pool, worst = filled(problem, seen), max(seen, key=lambda r: r.sums[DISTANCE])
     into = empty_routes(problem.arrays)
-    assert not recombine(problem.arrays, worst, pool, 0.0, into)
-    assert recombine(problem.arrays, worst, pool, WORK, into)
+    assert not run(problem.arrays, worst, pool, 0.0, into)
+    assert run(problem.arrays, worst, pool, WORK, into)
     remove(problem.arrays, worst, NODE(problem.arrays.uavs))  # so that it leaves a task out
-    assert not recombine(problem.arrays, worst, pool, 0.0, into)
-    assert recombine(problem.arrays, worst, pool, WORK, into)
+    assert not run(problem.arrays, worst, pool, 0.0, into)
+    assert run(problem.arrays, worst, pool, WORK, into)
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_few_uavs_that_are_alike_fly_each_others_routes(seed):
+    uavs, tasks = make(4, 8, seed, 1e9)
+    alike = [replace(uav, position=uavs[0].position) for uav in uavs[:3]]
+    problem = make_problem([*alike, uavs[3]], tasks, {}, Limits(), Rules(returns=True))
+    a, rng = problem.arrays, np.random.default_rng(seed)
+    a.unassigned_cost[:] = 500.0
+    classes = classes_of(a)
+    assert classes.tolist() == [0, 0, 0, 1]
+    seen, pool = [some_routes(problem, rng, 2) for _ in range(8)], empty_pool(a, classes)
+    for routes in seen:
+        collect(a, routes, pool)
+    owners = {frozenset(pool.stops[pool.first[e]:pool.first[e + 1]].tolist()):
+              int(classes[pool.uav[e]]) for e in range(pool.size[0])}
+    assert len(owners) <= pool.size[0] <= len(owners) + 4  # a set of tasks once for all alike
+    optimum = cheapest(problem, pool, classes)
+    for best in seen[:4]:
+        into = empty_routes(a)
+        if not repack(a, best, pool, classes, WORK, into):
+            copy_into(best, into)
+        assert total_cost(a, into) == pytest.approx(optimum + a.empty_route_length.sum())
+        assert into.sums[DISTANCE] == pytest.approx(into.length.sum())
+
+
+def test_uavs_are_alike_if_they_start_end_fly_and_serve_alike():
+    uavs, tasks = make(1, 5)
+    same = [replace(uavs[0], id=f'u{i}') for i in range(7)]
+    same[1] = replace(same[1], range=9.0)
+    same[2] = replace(same[2], home=(1.0, 2.0, 3.0))
+    same[3] = replace(same[3], position=(1.0, 2.0, 3.0), home=same[0].position)
+    tasks[0] = replace(tasks[0], allowed_uavs=frozenset({'u0', 'u5'}))
+    problem = make_problem(same, tasks, {'u6': (tasks[4],)}, Limits(), Rules(returns=True))
+    assert classes_of(problem.arrays).tolist() == [0, 1, 2, 3, 4, 0, 5]

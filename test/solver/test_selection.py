@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Problems in which tasks must be left out: the proof of it, and the search for the best ones."""
+"""Problems in which tasks may have to be left out: which, and the search for the best ones."""
 import math
 from dataclasses import replace
 
@@ -8,9 +8,22 @@ import pytest
 from plan_checks import check
 
 from uav_task_alloc import Task, Uav, plan
+from uav_task_alloc.solver.chain_q import (
+    COLD_SELECTION,
+    COLD_START,
+    MANY_ROUNDS,
+    ROUNDS_A_SECOND,
+    SHORT_START,
+    WARM_START,
+    _params,
+)
+from uav_task_alloc.solver.colony import Colony
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
-from uav_task_alloc.solver.routes import empty_routes
-from uav_task_alloc.solver.selection import MOST_BOUNDED, must_leave_tasks, out_of_reach
+from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.routes import NODE, clear, copy, copy_into, empty_routes, remove
+from uav_task_alloc.solver.ruin import list_unassigned_and_overrange
+from uav_task_alloc.solver.selection import leave_many, out_of_reach
+from uav_task_alloc.solver.warm import repair
 
 HOME = Rules(returns=True)
 
@@ -23,57 +36,100 @@ def fleet_and_tasks(tasks=60, uavs=2, reach=math.inf, seed=0):
              for i, ((x, y), value) in enumerate(zip(points, values, strict=True))])
 
 
-def is_proven(uavs, tasks, rules=HOME, budget=60.0):
+def leaves_many(uavs, tasks, served=(), rules=HOME):
     problem = make_problem(uavs, tasks, {}, Limits(), rules)
-    return must_leave_tasks(problem, empty_routes(problem.arrays), budget)
+    routes = empty_routes(problem.arrays)
+    for i in served:
+        routes.uav_of[len(uavs) + i] = 0
+    return leave_many(problem, routes)
 
 
-@pytest.mark.parametrize('returns', [True, False])
-@pytest.mark.parametrize('seed', range(3))
-def test_it_is_not_said_where_all_tasks_can_be_served(seed, returns):
-    uavs, tasks = fleet_and_tasks(30, seed=seed)
-    served = plan(uavs, tasks, budget=60.0, max_iterations=3000,
-                  route_end='home' if returns else 'hold')
-    reach = {uav.id: sum(leg.length for leg in served.legs[uav.id]) for uav in uavs}
-    tight = [replace(uav, range=reach[uav.id] + 1e-6) for uav in uavs]
-    assert served.value == sum(task.value for task in tasks)
-    assert not is_proven(tight, tasks, Rules(returns=returns))
-    half = [replace(uav, range=0.5 * uav.range) for uav in tight]
-    assert is_proven(half, tasks, Rules(returns=returns))
+def test_more_than_a_twentieth_of_the_tasks_left_out_by_first_routes_are_many():
+    uavs, tasks = fleet_and_tasks(reach=2000.0)
+    assert leaves_many(uavs, tasks)
+    assert leaves_many(uavs, tasks, range(56))
+    assert not leaves_many(uavs, tasks, range(57))
+    assert not leaves_many(uavs, tasks, rules=Rules(returns=True, hard=False))
+    assert not leaves_many(*fleet_and_tasks())  # no range limits them
+    assert not leaves_many(uavs, [])
+    assert not leaves_many([], tasks)
 
 
-def test_the_bound_is_as_tight_as_a_tour_of_a_circle():
-    points = [(math.cos(i * math.pi / 10.0), math.sin(i * math.pi / 10.0), 0.0)
-              for i in range(20)]
-    tasks = [Task(f't{i}', point) for i, point in enumerate(points[1:])]
-    tour = 20 * math.dist(points[0], points[1])
-    assert is_proven([Uav('u', points[0], 0.999 * tour)], tasks)
-    assert not is_proven([Uav('u', points[0], 1.001 * tour)], tasks)
-
-
-def test_tasks_out_of_reach_prove_nothing():
+def test_tasks_out_of_reach_do_not_count():
     uavs = [Uav('u', (0.0, 0.0, 0.0), 25.0), Uav('v', (100.0, 0.0, 0.0), 10.0)]
     tasks = [Task(name, (x, 0.0, 0.0)) for name, x in (
         ('near', 10.0), ('far', 50.0), ('other', 104.0), ('edge', 12.5), ('over', 12.6))]
     problem = make_problem(uavs, tasks, {}, Limits(), HOME)
     assert out_of_reach(problem).tolist() == [False, True, False, False, True]
-    assert not is_proven(uavs, tasks)
+    assert not leaves_many(uavs, tasks, (0, 2, 3))
+    assert leaves_many(uavs, tasks, (0, 2))
     barred = [*tasks, Task('barred', (10.0, 0.0, 0.0), allowed_uavs=frozenset({'v'}))]
     problem = make_problem(uavs, barred, {}, Limits(), HOME)
     assert out_of_reach(problem).tolist() == [False, True, False, False, True, True]
 
 
-def test_no_bound_is_computed_without_time_for_it_or_few_tasks_left():
-    uavs, tasks = fleet_and_tasks(reach=500.0)
-    assert is_proven(uavs, tasks)
-    assert not is_proven(uavs, tasks, budget=0.001)
-    assert not is_proven(uavs, tasks, Rules(returns=True, hard=False))
-    assert not is_proven(uavs, [])
-    assert not is_proven(*fleet_and_tasks(MOST_BOUNDED + 1, reach=500.0), budget=1e4)
+def test_tasks_are_selected_where_first_routes_leave_many_out_and_there_is_time():
+    def chosen(reach, warm=False, **limits):
+        problem = make_problem(*fleet_and_tasks(reach=reach), {}, Limits(), HOME)
+        recorder = Recorder(lambda: 0.0, 0.0, problem=problem, warm=warm, **limits)
+        recorder.offer(repair(problem, {}))
+        return _params(recorder)
+
+    assert chosen(2000.0, budget=1.0) is COLD_SELECTION
+    assert chosen(2000.0, budget=1.0, warm=True) is WARM_START
+    assert chosen(9000.0, budget=1.0) is COLD_START
+    few = MANY_ROUNDS * 60
+    assert chosen(2000.0, budget=0.9 * few / ROUNDS_A_SECOND) is SHORT_START
+    assert chosen(2000.0, budget=60.0, max_iterations=int(few) - 1) is SHORT_START
+    assert chosen(2000.0, budget=60.0, max_iterations=int(few)) is COLD_SELECTION
+
+
+def test_where_tasks_are_out_of_reach_few_others_left_out_are_few():
+    """Their price must not rise as that of few tasks does: 97 of 100 are out of reach."""
+    uavs = [Uav('u', (0.0, 0.0, 0.0), 45.0)]
+    tasks = [Task(f't{i}', (20.0 + i, 0.0, 0.0)) for i in range(100)]
     problem = make_problem(uavs, tasks, {}, Limits(), HOME)
-    routes = empty_routes(problem.arrays)
-    routes.uav_of[2:62] = 0
-    assert not must_leave_tasks(problem, routes, 60.0)
+    colony = Colony(problem, repair(problem, {}), 1, COLD_SELECTION)
+    assert (colony.arrays.unassigned_cost > 0.0).sum() == 3
+    clear(colony.arrays, colony.routes)
+    before = colony.arrays.unassigned_cost.copy()
+    list_unassigned_and_overrange(colony.arrays, colony.routes, colony._log)
+    assert colony._log.counts[2] == 3
+    assert (colony.arrays.unassigned_cost == before).all()
+
+
+def test_temperatures_follow_the_cost_of_leaving_a_task_out():
+    uavs, tasks = fleet_and_tasks(reach=2000.0)
+    near = make_problem(uavs, tasks, {}, Limits(), HOME)
+    far = make_problem([replace(uav, position=(9000.0, 0.0, 0.0), range=1e5) for uav in uavs],
+                       tasks, {}, Limits(), HOME)
+    temperatures = [Colony(problem, repair(problem, {}), 1, COLD_SELECTION).temperature(0.0)
+                    for problem in (near, far)]
+    first = COLD_SELECTION.coolings[0].first
+    assert temperatures[0] == pytest.approx(first * near.scale, rel=0.2)
+    assert temperatures[1] > 5.0 * temperatures[0]
+
+
+def test_once_all_are_served_the_search_is_one_for_short_routes():
+    uavs, tasks = fleet_and_tasks(30, reach=5000.0)
+    problem = make_problem(uavs, tasks, {}, Limits(), HOME)
+    full = repair(problem, {})
+    assert (full.uav_of[2:32] >= 0).all()
+    less = copy(full)
+    for node in (2, 3, 4):
+        remove(problem.arrays, less, NODE(node))
+    colony = Colony(problem, less, 1, replace(COLD_SELECTION, scouts=0.0))
+    colony.fly(0.0, 0.1, 1)
+    hot = colony.temperature(0.0)
+    copy_into(full, colony.best)
+    colony.fly(0.1, 0.2, 1)
+    assert colony._coolings[0].begin == 0.1  # not 0: it began anew
+    colony.routes.next[:] = 0
+    colony._all_served(0.5)
+    assert (colony.routes.next == full.next).all()
+    assert colony.temperature(0.5) < 0.1 * hot
+    assert [each.begin for each in colony._coolings] == pytest.approx([0.5, 0.725, 0.96])
+    assert colony.temperature(1.0) == pytest.approx(0.1 * problem.scale, rel=0.2)
 
 
 def test_the_best_tasks_are_chosen_where_some_must_be_left_out():

@@ -6,22 +6,27 @@ import threading
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from uav_task_alloc.solver.colony import Colony, ColonyParams
+from uav_task_alloc.solver.colony import Colony, ColonyParams, Cooling
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.ruin import MAX_STRING
-from uav_task_alloc.solver.selection import must_leave_tasks
+from uav_task_alloc.solver.selection import leave_many
 from uav_task_alloc.solver.warm import repair
 
-COLD_START = ColonyParams()
-# where not all tasks can be served: the choice of tasks, more than their order
-COLD_SELECTION = ColonyParams(start_temperature=150.0, end_temperature=1.3,
-                              reheat_temperature=60.0, skipped=0.3, by_value=0.3,
-                              selects=True)
+COLD_START = ColonyParams(heats=True)
+# where not all tasks may be served: the choice of tasks, more than their order
+_HOT = 260.0, 60.0, 60.0, 60.0, 260.0, 60.0, 60.0, 60.0
+COLD_SELECTION = ColonyParams(
+    coolings=(*(Cooling(0.109 * i, each, 1.3) for i, each in enumerate(_HOT)),
+              Cooling(0.87, 10.0, 1.3), Cooling(0.95, 1.3, 0.3)),
+    heats=True, skipped=0.3, by_value=0.3, selects=True)
+SHORT_START = ColonyParams()  # where there are few rounds
+MANY_ROUNDS = 25.0  # a task; with fewer high temperatures do not pay
+ROUNDS_A_SECOND = 1e5  # of a search, about
 # where ranges run out: exceeding one soon costs more than leaving a task out, so that the search
 # passes from plans beyond range to plans within range and back, often enough in a short budget
-WARM_START = ColonyParams(start_temperature=0.3, end_temperature=0.02, reheat_temperature=3.0,
-                          most_penalty=1e4, cost_growth=3.0, least_rounds=10.0,
-                          string_floor=float(MAX_STRING))
+WARM_START = ColonyParams(coolings=(Cooling(0.0, 0.3, 0.02), Cooling(0.45, 3.0, 0.02),
+                                    Cooling(0.92, 0.02, 0.02)), most_penalty=1e4, cost_growth=3.0,
+                          least_rounds=10.0, string_floor=float(MAX_STRING))
 _ROUND_TIME = 0.005  # [s] of one flight: the clock is read between flights
 FIXED_ROUNDS = 100  # rounds of a flight where iterations are limited
 EXCHANGES = 20  # how often in a budget a colony takes over the recorder's best
@@ -53,11 +58,15 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
 
 
 def _params(recorder: Recorder) -> ColonyParams:
-    """Parameters for a warm start, for tasks that must be left out, or for neither."""
+    """Parameters for a warm start, for a choice of tasks, or for neither."""
     if recorder.warm:
         return WARM_START
-    selects = must_leave_tasks(recorder.problem, recorder.best, recorder.budget)
-    return COLD_SELECTION if selects else COLD_START
+    rounds = recorder.budget * ROUNDS_A_SECOND
+    if recorder.max_iterations is not None:
+        rounds = min(rounds, recorder.max_iterations)
+    if rounds < MANY_ROUNDS * len(recorder.problem.tasks):
+        return SHORT_START
+    return COLD_SELECTION if leave_many(recorder.problem, recorder.best) else COLD_START
 
 
 class Flies(Protocol):

@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.kernel import inline_kernel, inner_allocating_kernel, inner_kernel
 from uav_task_alloc.solver.multipliers import Reduced
-from uav_task_alloc.solver.packing import MOST_PACKED, choose_columns
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Floats, Ints
 
 Flags = NDArray[np.bool_]
-MANY_LEFT_OUT = 0.05  # share of tasks from which on columns are chosen UAV by UAV
 MAX_TRIES = 20_000  # columns that are tried at most
 MAX_READS = 4_000_000  # words that `choose_columns` reads at most
 TRY_COST, READ_COST = 4.0, 5.0  # work of a try, of a word read, in stops read
@@ -284,17 +282,6 @@ def _reduced_cost(reduced: Reduced, group: Flags, tasks: Ints, flown: Ints, uav_
 
 
 @inner_allocating_kernel
-def _uavs_of(group: Flags) -> Ints:
-    """The UAVs of a group. O(m)."""
-    uavs, count = np.empty(group.size, np.int64), 0
-    for u in range(group.size):
-        if group[u]:
-            uavs[count] = u
-            count += 1
-    return uavs[:count]
-
-
-@inner_allocating_kernel
 def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: int,
                 flown: Ints, uav_of: Ints) -> tuple[bool, int]:
     """Choose the cheapest columns for a group of UAVs and its tasks. O(limit n).
@@ -315,13 +302,6 @@ def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: 
     if tasks.size == 0 or spare <= 0.0:
         return False, 1
     columns = candidates(pool, reduced, group, tasks, spare)
-    uavs, left_out = _uavs_of(group), 0
-    for t in tasks:
-        left_out += uav_of[t] < 0
-    if uavs.size <= MOST_PACKED and left_out > MANY_LEFT_OUT * tasks.size:
-        return choose_columns(pool, reduced, columns, uavs, np.arange(group.size), tasks, spare,
-                              min(MAX_READS, int(limit * TRY_COST / READ_COST)), flown,
-                              uav_of)
     branches = _branches(pool, columns, tasks, uav_of.size)
     return _branch_and_bound(pool, reduced, group, branches, spare, min(MAX_TRIES, limit), flown,
                              uav_of)

@@ -27,16 +27,20 @@ class Pool(NamedTuple):
     size: Ints  # (1) number of columns
 
 
-def empty_pool(a: Arrays) -> Pool:
+def empty_pool(a: Arrays, classes: Ints | None = None) -> Pool:
     """A pool without columns.
 
     Args:
         a: arrays of the problem, for the numbers of UAVs and nodes.
+        classes: (m) class of each UAV, from 0: routes of one with the same tasks are the same
+            column; None: each UAV has its own.
 
     Returns:
         The pool.
     """
     hashes = np.random.default_rng(0).integers(1, 2 ** 64, a.ends, np.uint64)
+    if classes is not None:
+        hashes[:a.uavs] = hashes[classes]
     return Pool(hashes, np.full(2 * MAX_COLUMNS, -1, np.int64), np.empty(MAX_COLUMNS, np.uint64),
                 np.empty(MAX_COLUMNS, np.int64), np.empty(MAX_COLUMNS),
                 np.zeros(MAX_COLUMNS + 1, np.int64), np.empty(MAX_STOPS, NODE),

@@ -1,13 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recombination of routes of the pool: groups of neighbouring UAVs exchange their tasks."""
+"""Recombination of routes of the pool: groups of neighbouring UAVs exchange their tasks.
+
+A few UAVs that leave tasks out choose among all columns, those that are alike among each other's.
+"""
 from __future__ import annotations
 
 import numpy as np
 
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel, inner_kernel, kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel, kernel
 from uav_task_alloc.solver.multipliers import Reduced, reduced_costs
-from uav_task_alloc.solver.partition import TRY_COST, Flags, repartition
-from uav_task_alloc.solver.pool import Pool, collect, column_of
+from uav_task_alloc.solver.packing import choose_columns
+from uav_task_alloc.solver.partition import (
+    MAX_READS,
+    READ_COST,
+    TRY_COST,
+    Flags,
+    candidates,
+    repartition,
+)
+from uav_task_alloc.solver.pool import Pool, collect, column_of, empty_pool
 from uav_task_alloc.solver.routes import (
     NODE,
     TINY,
@@ -67,7 +78,7 @@ def _tasks_of(a: Arrays, uav_of: Ints, group: Flags) -> Ints:
     return tasks[:count]
 
 
-@inner_kernel
+@kernel
 def _write(a: Arrays, pool: Pool, flown: Ints, into: Routes) -> None:
     """Write columns as routes. O(n)"""
     clear(a, into)
@@ -140,3 +151,100 @@ def recombine(a: Arrays, best: Routes, pool: Pool, work: float, into: Routes) ->
     reduced, bound = reduced_costs(a, pool, flown, worth, work)
     tries = 0 if worth - bound < TINY else int(work / TRY_COST)
     return bool(_improve(a, pool, reduced, tries, flown, uav_of, into))
+
+
+@allocating_kernel
+def pack_routes(pool: Pool, reduced: Reduced, uavs: Ints, classes: Ints, spare: float,
+                limit: int, flown: Ints) -> bool:
+    """Choose columns for all UAVs whose reduced costs are less than `spare`. O(limit).
+
+    Args:
+        pool: the columns.
+        reduced: their reduced costs.
+        uavs: all of them, by class.
+        classes: (m) class of each UAV; those of one may fly each other's columns.
+        spare: [m]
+        limit: words read, about, as for `choose_columns`.
+        flown: (m) column of each UAV, -1: none; is changed if there are any.
+
+    Returns:
+        Whether there are any.
+    """
+    ends = reduced.unassigned.size
+    tasks = np.arange(uavs.size, ends)
+    columns = candidates(pool, reduced, np.ones(uavs.size, np.bool_), tasks, spare)
+    found, _ = choose_columns(pool, reduced, columns, uavs, classes, tasks, spare, limit, flown,
+                              np.empty(ends, np.int64))
+    return bool(found)
+
+
+def packed(a: Arrays, pool: Pool, classes: Ints, flown: Ints, worth: float,
+           work: float) -> Ints | None:
+    """Find the cheapest columns for all UAVs at once. O(work).
+
+    Args:
+        a: the problem.
+        pool: the columns; one belongs to any UAV of the class that may fly it.
+        classes: (m) class of each UAV, from 0.
+        flown: (m) column of each UAV that first prices follow, -1: none.
+        worth: [m] more than empty routes and unassigned tasks cost now.
+        work: how many stops of the pool may be read for a bound, and in the search.
+
+    Returns:
+        (m) column of each UAV, -1: none; None: no combination found costs less.
+    """
+    reduced, bound = reduced_costs(a, pool, flown, worth, work)
+    most = np.zeros(a.uavs)
+    np.maximum.at(most, classes, reduced.stay)  # any UAV of a class could fly the best column
+    reduced.column[:] += (most[classes] - reduced.stay)[pool.uav[:reduced.column.size]]
+    bound -= float((most[classes] - reduced.stay).sum())
+    reduced.stay[:] = most[classes]
+    chosen, spare = np.full(a.uavs, -1), worth - bound - TINY
+    if spare < 0.0 or not pack_routes(pool, reduced, np.argsort(classes, kind='stable'), classes,
+                                      spare, min(MAX_READS, int(work / READ_COST)), chosen):
+        return None
+    return chosen
+
+
+def repack(a: Arrays, best: Routes, pool: Pool, classes: Ints, work: float,
+           into: Routes) -> bool:
+    """As `recombine`, for few UAVs that leave tasks out: all of them at once. O(work)."""
+    flown = np.full(a.uavs, -1, np.int64)
+    worth = float(_cost(a, pool, best, flown))
+    if worth == np.inf:
+        return False
+    chosen = packed(a, pool, classes, flown, worth, work)
+    if chosen is None:
+        return False
+    _write(a, pool, chosen, into)
+    return True
+
+
+def classes_of(a: Arrays) -> Ints:
+    """(m) class of each UAV, from 0: those of one start, end, fly and serve alike. O(m n)."""
+    rows = np.hstack((a.xyz[:a.uavs], a.xyz[a.ends:a.ends + a.uavs], a.compatible,
+                      np.column_stack((a.range_left, a.empty_route_length))))
+    seen: dict[bytes, int] = {}
+    return np.array([seen.setdefault(row.tobytes(), len(seen)) for row in rows], np.int64)
+
+
+def load_packing(a: Arrays) -> None:
+    """Call the kernel of `packed` once, so that it is compiled.
+
+    Args:
+        a: any problem.
+    """
+    pool, uavs = empty_pool(a), np.arange(a.uavs)
+    reduced, _ = reduced_costs(a, pool, np.full(a.uavs, -1), 0.0, 0.0)
+    pack_routes(pool, reduced, uavs, uavs, 1.0, 1, uavs.copy())
+
+
+def load_repacking(a: Arrays, routes: Routes) -> None:
+    """Call the kernels of `repack` once, so that they are compiled.
+
+    Args:
+        a: any problem.
+        routes: any of its routes; they are cleared.
+    """
+    load_packing(a)
+    _write(a, empty_pool(a), np.full(a.uavs, -1), routes)

@@ -116,11 +116,14 @@ def list_unassigned_and_overrange(a: Arrays, r: Routes, log: RuinLog) -> None:
         if r.length[u] > a.range_left[u] + TINY and r.tasks[u] > 0:
             log.overrange[log.counts[3]] = u
             log.counts[3] += 1
+    within = 0  # tasks that it costs something not to serve
     for t in range(a.uavs, a.ends):
-        if r.uav_of[t] < 0 and a.unassigned_cost[t - a.uavs] > 0.0:
-            log.unassigned[log.counts[2]] = t
-            log.counts[2] += 1
-    if log.counts[2] < FEW * (a.ends - a.uavs):
+        if a.unassigned_cost[t - a.uavs] > 0.0:
+            within += 1
+            if r.uav_of[t] < 0:
+                log.unassigned[log.counts[2]] = t
+                log.counts[2] += 1
+    if log.counts[2] < FEW * within:
         for i in range(log.counts[2]):
             t = log.unassigned[i] - a.uavs
             cost = COST_GROWTH * a.unassigned_cost[t]

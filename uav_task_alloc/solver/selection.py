@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether tasks have to be left out: a lower bound on the length of routes that serve all.
-
-Held and Karp, The Traveling-Salesman Problem and Minimum Spanning Trees, Operations Research 18
-(1970): routes that serve all tasks are a spanning tree rooted at the starts, and legs home.
-Multipliers of the tasks whose degree in it is not 2 raise the bound.
-"""
+"""Whether tasks may have to be left out, and which are out of reach in any case."""
 from __future__ import annotations
 
 import math
@@ -16,12 +11,7 @@ from numpy.typing import NDArray
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import Floats, Routes
 
-FEW_LEFT = 0.05  # up to this share of tasks left out by the first routes no bound is computed
-MOST_STEPS = 10  # of the multipliers
-MOST_BOUNDED = 1000  # tasks; of more, the lengths between all pairs would take too much memory
-SHARE = 0.02  # of the budget that the bound may take
-ROW_TIME, ENTRY_TIME = 5e-6, 1e-8  # [s] of a step, for each task and each pair of tasks
-STEP, STEP_DECAY = 0.03, 0.95  # of the multipliers, in mean distances between tasks; its factor
+FEW_LEFT = 0.05  # share of the tasks within reach that first routes may leave out
 
 
 def out_of_reach(problem: Problem) -> NDArray[np.bool_]:
@@ -44,73 +34,24 @@ def out_of_reach(problem: Problem) -> NDArray[np.bool_]:
     return np.asarray((least > 1e-6) | (a.unassigned_cost <= 0.0))
 
 
-def must_leave_tasks(problem: Problem, routes: Routes, budget: float) -> bool:
-    """Return whether it is proven that not all tasks within reach can be served.
+def leave_many(problem: Problem, routes: Routes) -> bool:
+    """Return whether first routes leave so many tasks out that some may have to be.
 
     Args:
         problem: that is solved.
         routes: its first routes.
-        budget: [s] of the solve; the bound is computed as far as SHARE of it allows.
 
     Returns:
-        False as well where the bound is too weak or takes too long, or few tasks are left out.
+        Whether more than FEW_LEFT of the tasks within reach are left out, because of hard ranges.
     """
     a = problem.arrays
-    if not a.hard or a.uavs == 0 or a.ends == a.uavs:
+    if not a.hard or a.ends == a.uavs or not np.isfinite(a.range_left).any():
         return False
-    left = float(a.range_left.sum())
-    if not math.isfinite(left) or np.mean(routes.uav_of[a.uavs:a.ends] < 0) <= FEW_LEFT:
+    left = routes.uav_of[a.uavs:a.ends] < 0
+    if np.mean(left) <= FEW_LEFT:
         return False
-    tasks = int(a.ends - a.uavs)
-    if tasks > MOST_BOUNDED:
-        return False
-    steps = int(SHARE * budget / (tasks * (ROW_TIME + tasks * ENTRY_TIME)))
-    return steps > 0 and _exceeds(problem, left, min(steps, MOST_STEPS))
-
-
-def _exceeds(problem: Problem, left: float, steps: int) -> bool:
-    """Whether routes that serve all tasks within reach are longer than `left` [m] in all."""
-    a = problem.arrays
-    tasks = a.xyz[a.uavs:a.ends][~out_of_reach(problem)]
-    if len(tasks) == 0:
-        return False
-    first, last = (np.min([_distances(tasks, point) for point in points], axis=0)
-                   for points in (a.xyz[:a.uavs], a.xyz[a.ends:a.ends + a.uavs]))
-    between = np.sqrt(((tasks[:, None] - tasks[None]) ** 2).sum(axis=2))
-    price, step = np.zeros(len(tasks)), STEP * float(between.mean())
-    for _ in range(steps):
-        length, degree = _tree(between + price[:, None] + price, first + price)
-        legs_home = last + price if a.returns else price
-        order = np.argsort(legs_home)[:a.uavs]
-        for k, t in enumerate(order):
-            if k == 0 or legs_home[t] < 0.0:  # a route ends there; at least one does
-                length += float(legs_home[t])
-                degree[t] += 1.0
-        if length - 2.0 * float(price.sum()) > left * (1.0 + 1e-9):
-            return True
-        price += step * (degree - 2.0)
-        step *= STEP_DECAY
-    return False
-
-
-def _tree(between: Floats, first: Floats) -> tuple[float, Floats]:
-    """Length of the shortest spanning tree of a root and n nodes, and their degrees. O(n^2).
-
-    between: (n, n) lengths; first: (n,) lengths from the root. Prim's algorithm.
-    """
-    key, length = first.copy(), 0.0
-    parent, degree = np.full(key.size, -1), np.zeros(key.size)
-    outside = np.zeros(key.size)  # inf: in the tree
-    for _ in range(key.size):
-        t = int(np.argmin(key + outside))
-        length += float(key[t])
-        degree[t] += 1.0
-        if parent[t] >= 0:
-            degree[parent[t]] += 1.0
-        outside[t] = math.inf
-        nearer = between[t] + outside < key
-        key[nearer], parent[nearer] = between[t][nearer], t
-    return length, degree
+    within = ~out_of_reach(problem)
+    return bool(left[within].sum() > FEW_LEFT * within.sum())
 
 
 def _distances(points: Floats, point: Floats) -> Any:

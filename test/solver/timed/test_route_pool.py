@@ -7,6 +7,7 @@ from test_timed_recombine import least_cost, some_routes, two_bases
 
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
+from uav_task_alloc.solver.colony import RECOMBINED_COST
 from uav_task_alloc.solver.packing import MOST_PACKED
 from uav_task_alloc.solver.pool import MAX_COLUMNS
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
@@ -93,6 +94,21 @@ def test_uavs_that_are_alike_may_fly_each_others_routes():
     assert {*map(tuple, names(problem, flown(problem, found)).values())} == {*good}
     assert combined(problem.arrays, problem.base.arrays, flown(problem, found), pool, WORK) is None
     assert combined(problem.arrays, problem.base.arrays, worse, pool, 0.0) is None  # no work
+
+
+@pytest.mark.parametrize('share', [0.5, 0.2])  # of what the way to a task costs, of its price
+def test_a_combination_that_serves_more_is_found_at_a_low_price(share):
+    problem, good = sides()
+    a, less = problem.arrays, set_routes(problem, {'a': good[0], 'b': good[1], 'c': ('e1',)})
+    way = cost_of_route(a, set_routes(problem, {'c': good[2]}), 2) - cost_of_route(a, less, 2)
+    a.unserved[:-1], a.unserved[-1] = 1e5, share * way
+    less = set_routes(problem, {'a': good[0], 'b': good[1], 'c': ('e1',)})
+    pool = pool_of(problem, [less, set_routes(problem, {'c': good[2]})])
+    found = combined(a, problem.base.arrays, less, pool, WORK)
+    if share * RECOMBINED_COST > 1.0:
+        assert {*map(tuple, names(problem, flown(problem, found)).values())} == {*good}
+    else:
+        assert found is None
 
 
 def test_the_search_goes_on_from_a_better_combination():

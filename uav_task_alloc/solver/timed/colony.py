@@ -68,7 +68,7 @@ COLD = TimedParams(intensifies=True)
 # where many tasks have to be left out: the choice of tasks, more than their order
 SELECTION = TimedParams(coolings=((0.0, 60.0), (0.6, 6.0)), end_temperature=1.3,
                         pool_coolings=((0.0, 60.0), (0.25, 60.0), (0.45, 60.0), (0.65, 60.0),
-                                       (0.85, 10.0), (0.95, 1.3)),
+                                       (0.85, 10.0), (0.95, 1.3), (0.985, 1.3)),
                         short_end_temperature=1.3, ruin=10.0, skipped=0.3, by_value=0.3,
                         least_price=10.0, by_gaps=True, by_labels=True, first_price=math.inf)
 WARM = TimedParams(coolings=((0.0, 0.3),), end_temperature=0.02,

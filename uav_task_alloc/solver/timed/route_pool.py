@@ -10,14 +10,14 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from uav_task_alloc.kernel import allocating_kernel, inner_kernel
+from uav_task_alloc.kernel import inner_kernel
 from uav_task_alloc.model import Task, Uav
-from uav_task_alloc.solver.multipliers import Reduced, reduced_costs
-from uav_task_alloc.solver.packing import MOST_PACKED, choose_columns
-from uav_task_alloc.solver.partition import MAX_READS, READ_COST, candidates
+from uav_task_alloc.solver.colony import RECOMBINED_COST
+from uav_task_alloc.solver.packing import MOST_PACKED
 from uav_task_alloc.solver.pool import Pool, empty_pool, new_column, slot_of_key
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.routes import TINY, Arrays, Ints
+from uav_task_alloc.solver.recombine import packed
+from uav_task_alloc.solver.routes import TINY, Arrays
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.recombine import cost_of_route
@@ -77,33 +77,11 @@ def collect_routes(a: TimedArrays, r: TimedRoutes, pool: Pool) -> None:
             t, i = r.link[t, at.NEXT], i + 1
 
 
-@allocating_kernel
-def pack_routes(a: TimedArrays, pool: Pool, reduced: Reduced, spare: float, limit: int,
-                flown: Ints) -> bool:
-    """Choose columns whose reduced costs are less than `spare` in all. O(limit).
-
-    Args:
-        a: the problem.
-        pool: the columns.
-        reduced: their reduced costs.
-        spare: [m]
-        limit: words read, about, as for `choose_columns`.
-        flown: (m) column of each UAV, -1: none; is changed if there are any.
-
-    Returns:
-        Whether there are any.
-    """
-    tasks = np.arange(a.uavs, a.ends)
-    columns = candidates(pool, reduced, np.ones(a.uavs, np.bool_), tasks, spare)
-    found, _ = choose_columns(pool, reduced, columns, a.members, a.class_of, tasks, spare, limit,
-                              flown, np.empty(a.ends, np.int64))
-    return bool(found)
-
-
 def _cost_over_empty(a: TimedArrays, r: TimedRoutes) -> float:
-    """What all routes cost more than empty ones, with unserved tasks."""
+    """What all routes cost more than empty ones, with unserved tasks at their raised prices."""
     metres = r.sums[at.METRES] - a.begin[:, at.EMPTY_LENGTH].sum()
-    cost = r.sums[at.UNSERVED_COST] + a.weight[at.BY_DISTANCE] * metres + r.sums[at.TIME_COST]
+    cost = RECOMBINED_COST * r.sums[at.UNSERVED_COST] + a.weight[at.BY_DISTANCE] * metres
+    cost += r.sums[at.TIME_COST]
     if a.weight[at.BY_EXCESS] < np.inf:
         cost += a.weight[at.BY_EXCESS] * (r.sums[at.RANGE_EXCESS] + r.sums[at.ENDURANCE_EXCESS])
     return float(cost)
@@ -111,19 +89,14 @@ def _cost_over_empty(a: TimedArrays, r: TimedRoutes) -> float:
 
 def combined(a: TimedArrays, base: Arrays, r: TimedRoutes, pool: Pool,
              work: float) -> list[list[int]] | None:
-    """As `recombined`, of the columns of such a pool: all UAVs at once. O(work)."""
-    worth = _cost_over_empty(a, r)
-    reduced, bound = reduced_costs(base._replace(unassigned_cost=a.unserved), pool,
-                                   np.full(a.uavs, -1), worth, work)
-    most = np.zeros(a.first_member.size - 1)
-    np.maximum.at(most, a.class_of, reduced.stay)
-    reduced.column[:] += (most[a.class_of] - reduced.stay)[pool.uav[:reduced.column.size]]
-    bound -= float((most[a.class_of] - reduced.stay).sum())
-    reduced.stay[:] = most[a.class_of]
-    flown = np.full(a.uavs, -1)
-    if worth - bound < TINY or not pack_routes(
-            a, pool, reduced, worth - bound - TINY, min(MAX_READS, int(work / READ_COST)), flown):
+    """As `recombined`, of the columns of such a pool: all UAVs at once. O(work).
+
+    A task left out costs RECOMBINED_COST times its price, as to combine columns for more value
+    pays even where that costs more metres than the price.
+    """
+    raised = base._replace(unassigned_cost=RECOMBINED_COST * a.unserved)
+    flown = packed(raised, pool, a.class_of, np.full(a.uavs, -1), _cost_over_empty(a, r), work)
+    if flown is None:
         return None
     return [pool.stops[pool.first[e]:pool.first[e + 1]].tolist() if e >= 0 else []
             for e in flown.tolist()]
-

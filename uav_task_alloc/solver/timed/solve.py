@@ -8,8 +8,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
-import numpy as np
-
 from uav_task_alloc.kernel_cache import (
     NO_WORK,
     NOTICE,
@@ -21,10 +19,9 @@ from uav_task_alloc.kernel_cache import (
 )
 from uav_task_alloc.model import Plan, Task, ThreatZone, Uav, turned_tasks
 from uav_task_alloc.solver.chain_q import run_colonies
-from uav_task_alloc.solver.multipliers import reduced_costs
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
-from uav_task_alloc.solver.pool import empty_pool
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.recombine import load_packing
 from uav_task_alloc.solver.timed.answer import to_timed_plan
 from uav_task_alloc.solver.timed.colony import (
     COLD,
@@ -40,7 +37,7 @@ from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
 from uav_task_alloc.solver.timed.round import empty_round
-from uav_task_alloc.solver.timed.route_pool import may_combine, pack_routes
+from uav_task_alloc.solver.timed.route_pool import may_combine
 from uav_task_alloc.solver.timed.search import BEST_WORTH, FEW_ABSENT, Incumbent
 from uav_task_alloc.solver.timed.warm import completed, first_plan
 from uav_task_alloc.solver.warm import WarmState
@@ -200,10 +197,7 @@ def _call_kernels(zones: bool, search: bool, paths: bool, large: bool, few: bool
         best_label(problem.arrays, empty_timed_routes(problem.arrays), 0,
                    empty_labels(len(tasks), 1), 1.0, 1.0)
     if few:
-        base, none = problem.base.arrays, np.full(len(uavs), -1)
-        pool = empty_pool(base)
-        reduced, _ = reduced_costs(base, pool, none, 0.0, 0.0)
-        pack_routes(problem.arrays, pool, reduced, 1.0, 1, none)
+        load_packing(problem.base.arrays)
     if large:
         search_of_many = Intensifier(problem, problem.arrays)
         routes, scratch = empty_timed_routes(problem.arrays), empty_round(problem.arrays)
