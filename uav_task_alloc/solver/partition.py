@@ -19,7 +19,7 @@ from uav_task_alloc.solver.routes import TINY, Floats, Ints
 Flags = NDArray[np.bool_]
 MAX_TRIES = 20_000  # columns that are tried at most
 MAX_READS = 4_000_000  # words that `choose_columns` reads at most
-TRY_COST, READ_COST = 4.0, 5.0  # work of a try, of a word read, in stops read
+TRY_COST, READ_COST = 20.0, 5.0  # work of a try, of a word read, in stops read
 _INSERTION = 15  # items from which quicksort splits
 UNTRIED, UNSERVED = -1, -2  # instead of a column: nothing tried yet; the task is not served
 

@@ -22,6 +22,7 @@ from uav_task_alloc.solver.timed.arrays import TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.route_sums import is_infeasible
 
 _NEAR_TASKS = 6  # neighbours of a task that make two routes adjacent
+ROUND_COST = 5.0  # of a round over one without time: so much more of the tries a round pays
 
 
 class TimedPool(NamedTuple):
@@ -193,7 +194,7 @@ def recombined(a: TimedArrays, base: Arrays, r: TimedRoutes, timed: TimedPool,
                work: float) -> list[list[int]] | None:
     """A combination of the columns that costs less than these routes; None: not found.
 
-    Reads about `work` stops for a bound, and as many again in the search. O(work).
+    Reads about `work` stops for a bound, and ROUND_COST times as many in the search. O(work).
 
     Args:
         a: the problem.
@@ -215,7 +216,7 @@ def recombined(a: TimedArrays, base: Arrays, r: TimedRoutes, timed: TimedPool,
     absent = label_of[labels:] < 0
     worth = float(pool.cost[flown[flown >= 0]].sum() + a.unserved[absent].sum())
     reduced, bound = reduced_costs(labelled(a, base), pool, flown, worth, work)
-    tries = 0 if worth - bound < TINY else int(work / TRY_COST)
+    tries = 0 if worth - bound < TINY else int(ROUND_COST * work / TRY_COST)
     if not _improve(a, timed, reduced, tries, flown, label_of):
         return None
     return _by_uav(a, timed, flown[flown >= 0].tolist())
