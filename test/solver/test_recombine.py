@@ -20,6 +20,7 @@ from uav_task_alloc.solver.routes import (
     insert,
     remove,
     total_cost,
+    update_sums,
 )
 from uav_task_alloc.solver.warm import repair
 
@@ -129,6 +130,18 @@ def test_a_best_beyond_range_or_an_empty_pool_or_no_work_changes_nothing(run):
     assert run(problem.arrays, worst, pool, WORK, into)
 
 
+def exchanged(a, routes, uav_of):
+    """The same with the route of UAV u flown by uav_of[u]."""
+    new = empty_routes(a)
+    for u, other in enumerate(uav_of):
+        t = routes.next[u]
+        while t < a.ends:
+            insert(a, new, NODE(t), new.prev[a.ends + other])
+            t = routes.next[t]
+    update_sums(a, new)
+    return new
+
+
 @pytest.mark.parametrize('seed', range(6))
 def test_few_uavs_that_are_alike_fly_each_others_routes(seed):
     uavs, tasks = make(4, 8, seed, 1e9)
@@ -141,9 +154,13 @@ def test_few_uavs_that_are_alike_fly_each_others_routes(seed):
     seen, pool = [some_routes(problem, rng, 2) for _ in range(8)], empty_pool(a, classes)
     for routes in seen:
         collect(a, routes, pool)
-    owners = {frozenset(pool.stops[pool.first[e]:pool.first[e + 1]].tolist()):
-              int(classes[pool.uav[e]]) for e in range(pool.size[0])}
-    assert len(owners) <= pool.size[0] <= len(owners) + 4  # a set of tasks once for all alike
+    columns = int(pool.size[0])
+    for routes in seen:  # the same routes, each flown by another of those alike
+        collect(a, exchanged(a, routes, (1, 2, 0, 3)), pool)
+    assert pool.size[0] == columns
+    for routes in seen:  # and by one that is not alike
+        collect(a, exchanged(a, routes, (3, 1, 2, 0)), pool)
+    assert pool.size[0] > columns
     optimum = cheapest(problem, pool, classes)
     for best in seen[:4]:
         into = empty_routes(a)

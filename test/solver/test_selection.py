@@ -110,6 +110,21 @@ def test_temperatures_follow_the_cost_of_leaving_a_task_out():
     assert temperatures[1] > 5.0 * temperatures[0]
 
 
+@pytest.mark.parametrize('returns', [True, False])
+def test_routes_that_return_to_a_base_far_away_are_searched_at_higher_temperatures(returns):
+    uavs, tasks = fleet_and_tasks()
+    far = [replace(uav, position=(9000.0, 0.0, 0.0)) for uav in uavs]
+    problem = make_problem(far, tasks, {}, Limits(), Rules(returns=returns))
+    distance = np.mean([math.dist(task.position, far[0].position) for task in tasks])
+    cold, short = (Colony(problem, repair(problem, {}), 1, params)
+                   for params in (COLD_START, SHORT_START))
+    assert short.temperature(0.0) == pytest.approx(3.0 * problem.scale)
+    assert cold.temperature(0.0) == pytest.approx(distance if returns else 3.0 * problem.scale)
+    for colony in (cold, short):
+        colony._cooling = 2
+        assert colony.temperature(1.0) == pytest.approx(0.1 * problem.scale)
+
+
 def test_once_all_are_served_the_search_is_one_for_short_routes():
     uavs, tasks = fleet_and_tasks(30, reach=5000.0)
     problem = make_problem(uavs, tasks, {}, Limits(), HOME)
@@ -123,7 +138,7 @@ def test_once_all_are_served_the_search_is_one_for_short_routes():
     hot = colony.temperature(0.0)
     copy_into(full, colony.best)
     colony.fly(0.1, 0.2, 1)
-    assert colony._coolings[0].begin == 0.1  # not 0: it began anew
+    assert colony._coolings[0].begin == 0.1  # not 0: new coolings, for the rest of the budget
     colony.routes.next[:] = 0
     colony._all_served(0.5)
     assert (colony.routes.next == full.next).all()

@@ -100,7 +100,8 @@ class Colony:
         self._rng, self._log = rng_state(seed), empty_log(arrays)
         self.scouts = Scouts(problem, self.arrays, self._rng, learnt, params.learning)
         self._scale, self._coolings = problem.scale, params.coolings
-        self._unit, self._complete = problem.scale, math.inf
+        self._unit = problem.scale  # [m] of a temperature of 1
+        self._complete = math.inf  # value of all tasks, while some may have to be left out
         floors = {'employed': params.employed, 'onlooker': params.onlookers,
                   'scout': params.scouts}
         self._bids = Bidding({kind: floor for kind, floor in floors.items() if floor > 0.0})
@@ -151,13 +152,13 @@ class Colony:
     def temperature(self, spent: float) -> float:
         """Temperature [m] after this share of the budget."""
         begin, first, last = self._coolings[self._cooling]
-        share = min(1.0, max(0.0, (spent - begin) / (self._next_cooling() - begin)))
+        share = min(1.0, max(0.0, (spent - begin) / (self._next_cooling(1.0) - begin)))
         return float(self._unit * first * (last / first) ** share)
 
-    def _next_cooling(self) -> float:
-        """Share of the budget after which the next cooling begins."""
+    def _next_cooling(self, default: float) -> float:
+        """Share of the budget after which the next cooling begins; the default: there is none."""
         later = self._coolings[self._cooling + 1:]
-        return later[0].begin if later else 1.0
+        return later[0].begin if later else default
 
     def fly(self, spent: float, until: float, rounds: int) -> int:
         """Run one flight of the kind of bee whose turn it is.
@@ -173,8 +174,8 @@ class Colony:
         p = self.params
         if self.best.sums[VALUE] >= self._complete:
             self._all_served(spent)
-        if until > self._next_cooling() and spent > 0.0:
-            while until > self._next_cooling():
+        if until > self._next_cooling(math.inf) and spent > 0.0:
+            while until > self._next_cooling(math.inf):
                 self._cooling += 1
             self._intensify(WORK * rounds / max(1e-6, until - spent))
         costs = {'employed': rounds * p.employed_ruin, 'onlooker': rounds * p.onlooker_ruin,

@@ -22,7 +22,7 @@ from uav_task_alloc.solver.timed.arrays import TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.route_sums import is_infeasible
 
 _NEAR_TASKS = 6  # neighbours of a task that make two routes adjacent
-ROUND_COST = 5.0  # of a round over one without time: so much more of the tries a round pays
+ROUND_COST = 5.0  # time of a round over that of one without times, by which work is counted
 
 
 class TimedPool(NamedTuple):
