@@ -35,6 +35,7 @@ tasks = [Task(f't{i}', (10.0 * i, 40.0 + 7.0 * (i % 5), 0.0), value=1.0 + i % 3,
               allowed_uavs=frozenset({'u1'}) if i % 9 == 0 else None) for i in range(40)]
 dome = ThreatZone.hemisphere('dome', (150.0, 40.0, 0.0), 20.0)
 plan(uavs, tasks, max_iterations=0)
+plan([Uav(f'b{i}', (0.0, 0.0, 0.0), 150.0) for i in range(4)], tasks, max_iterations=0)
 print('late:', *sorted(loaded() - before))
 load_kernels()
 load_kernels(zones=True)

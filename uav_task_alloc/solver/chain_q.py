@@ -9,8 +9,8 @@ from typing import Any, Protocol
 from uav_task_alloc.solver.colony import Colony, ColonyParams, Cooling
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.ruin import MAX_STRING
+from uav_task_alloc.solver.savings import offer_first
 from uav_task_alloc.solver.selection import leave_many
-from uav_task_alloc.solver.warm import repair
 
 COLD_START = ColonyParams(heats=True)
 # where not all tasks may be served: the choice of tasks, more than their order
@@ -47,7 +47,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     """
     problem = recorder.problem
     if not recorder.history:
-        recorder.offer(repair(problem, {}))
+        offer_first(recorder)
     if not problem.tasks or not problem.uavs or recorder.over():
         return learnt
     params = params or _params(recorder)

@@ -30,6 +30,7 @@ from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
 from uav_task_alloc.solver.recombine import load_repacking
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
+from uav_task_alloc.solver.savings import offer_first
 from uav_task_alloc.solver.search import trim_to_range
 from uav_task_alloc.solver.separated import separated_plan
 from uav_task_alloc.solver.timed.solve import solve_timed
@@ -128,7 +129,7 @@ def _solve(fleet: Sequence[Uav], work: Sequence[Task], held: Mapping[str, tuple[
     if warm is not None:
         recorder.offer(repair(problem, before.routes))
     elif limits.zones:
-        recorder.offer(repair(problem, {}))
+        offer_first(recorder)
     search.begin(1.0, SEARCH_LIMIT)
     learnt = SOLVERS[solver](recorder, seed, before.learnt)
     result = to_plan(problem, recorder, solver, warm is not None)
@@ -180,14 +181,14 @@ def load_kernels(solver: str = 'chain_q', zones: bool = False, search: bool = Tr
 
 def _call_kernels(solver: str, zones: bool, search: bool) -> None:
     """Solve a small world, so that each kernel is called."""
-    uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
+    uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0), Uav('w', (0.0, 0.0, 0.0)))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
     between = (*(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0)),
                ThreatZone.hemisphere('dome', (3.5, 1.5, 0.0), 0.3),
                ThreatZone.polygon('prism', ((0.4, 0.9), (0.6, 0.9), (0.5, 1.1)))) if zones else ()
     paths = PathPreparation(lambda: 0.0, 0.0, 1.0, flown={'u': (('t0',), (Leg((), 0.0),))})
     problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True), None, paths)
-    rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has had a flight
+    rounds = 800 if solver == 'chain_q' else 64  # until each kind of bee has had a flight
     rounds *= search
     recorder = Recorder(lambda: 0.0, 0.0, 1.0, max_iterations=rounds, problem=problem)
     SOLVERS[solver](recorder, 0, None)
