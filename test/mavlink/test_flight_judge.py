@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'benchmarks' / 'endurance'))
 
+from flight_events import FlightEvents
 from flight_judge import OURS, Judge
 from flights import Flight
 
@@ -222,9 +223,9 @@ def test_a_late_command_of_the_bridge_that_ends_an_avoidance_hands_back(mode, ov
 
 def fly_random(monkeypatch, number, break_bridge):
     """A random flight without interventions, with a bridge that is broken in one way."""
-    monkeypatch.setattr(Flight, '_schedule', lambda self: None)
+    monkeypatch.setattr(FlightEvents, '_schedule', lambda self, new_list: None)
     flight = Flight(1, number, lossy=False)
-    flight.later = [(40.0, flight.new_list), (55.0, flight.new_list), (70.0, flight.new_list)]
+    flight.events.later = [(when, flight.new_list) for when in (40.0, 55.0, 70.0)]
     break_bridge(monkeypatch)
     flight.fly()
     return flight.result()[0]
