@@ -29,7 +29,7 @@ class FlightEvents:
         rng: random numbers of the flight.
         kind: of autopilot.
         world: where they happen.
-        judge: is told of those that change what can be known.
+        judge: is notified of reboots and of restarts without stored state.
         new_list: gives the bridge another list.
     """
 
