@@ -144,3 +144,12 @@ def test_the_better_of_auction_and_joined_routes_is_offered():
         auction = repair(problem, {}).sums
         assert (recorder.best.sums[DISTANCE] < 0.9 * auction[DISTANCE]) == one_base
         assert recorder.best.sums[VALUE] >= auction[VALUE] > 490.0
+
+
+def test_no_routes_are_joined_after_the_end_of_the_budget():
+    instance = make_instance(50, 500, 3, True)
+    problem = make_problem(instance.uavs, instance.tasks, {}, Limits(), Rules())
+    times = iter((0.0, 2.0, 2.0))  # the first plan is there after 2 s of 1 s
+    recorder = Recorder(lambda: next(times, 2.0), 0.0, 1.0, problem=problem)
+    offer_first(recorder)
+    assert recorder.best.sums[DISTANCE] == repair(problem, {}).sums[DISTANCE]

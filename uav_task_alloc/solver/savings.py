@@ -56,13 +56,14 @@ def join_chains(chains: TaskChains, near: Ints, savings: Floats, order: Ints) ->
 
 
 def offer_first(recorder: Recorder) -> None:
-    """Offer the routes of an auction, and joined ones where UAVs share a base.
+    """Offer the routes of an auction, and joined ones where UAVs share a base and time is left.
 
     Args:
         recorder: keeps the better ones.
     """
     recorder.offer(repair(recorder.problem, {}))
-    joined = joined_routes(recorder.problem)
+    in_time = recorder.elapsed() < recorder.budget
+    joined = joined_routes(recorder.problem) if in_time else None
     if joined is not None:
         recorder.offer(joined)
 
