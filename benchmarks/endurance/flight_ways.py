@@ -15,6 +15,7 @@ from uav_task_alloc.sim.config import FlightMode
 EVERY = 8.0  # [m] between the places along a way that are looked at
 NEAR = 10.0  # [m] from a place: it was passed
 WIND = 1.0  # [m] of a reached item from a point of a way
+APART = 5.0  # [m] at least, of a point of a way from the place of another task
 
 
 def random_ways(rng: random.Random, places: dict[str, Point], share: float,
@@ -31,13 +32,22 @@ def random_ways(rng: random.Random, places: dict[str, Point], share: float,
         if rng.random() >= share:
             continue
         path, course = [(x, y, z)], rng.uniform(0.0, 2.0 * math.pi)
+        others = [place for other, place in places.items() if other != name]
         for _ in range(rng.randint(1, 3)):
-            course += rng.uniform(-1.2, 1.2)
-            length = rng.uniform(40.0, 120.0)
-            x, y = x + length * math.cos(course), y + length * math.sin(course)
-            path.append((x, y, z))
+            course, point = _next_point(rng, path[-1], course)
+            while any(math.dist(point, place) < APART for place in others):
+                course, point = _next_point(rng, path[-1], course)
+            path.append(point)
         ways[name] = tuple(path)
     return ways
+
+
+def _next_point(rng: random.Random, before: Point, course: float) -> tuple[float, Point]:
+    """A course near the one before, and a point on it."""
+    x, y, z = before
+    course += rng.uniform(-1.2, 1.2)
+    length = rng.uniform(40.0, 120.0)
+    return course, (x + length * math.cos(course), y + length * math.sin(course), z)
 
 
 class WayJudge:

@@ -3,8 +3,12 @@
 import math
 
 import pytest
-from piece_bench import halfway, list_of, piece, strip, surveying
+from piece_bench import halfway, list_of, piece, places, strip, surveying
 
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
+from uav_task_alloc.sim.config import FlightMode
+
+RETURN = {'ardupilot': 6, 'px4': 0x05040000}
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 
@@ -107,3 +111,31 @@ def test_a_strip_is_completed_where_the_vehicle_is_lost_at_its_end(kind, flown):
     assert not bench.completed()
     bench.run(limit=4.0)
     assert bench.completed() == ['F#0'] * flown
+
+
+@BOTH
+@pytest.mark.parametrize('lost', [True, False])
+def test_what_follows_a_way_in_another_mode_is_flown_again(kind, lost):
+    task, in_mission = strip(0, length=300.0), []
+    bench, _ = surveying(kind, list_of(task), tick=0.05)
+    vehicle, shown = bench.vehicles[1], [False]
+    step = vehicle.step
+
+    def stepped(now):
+        out = step(now)
+        if vehicle.flight.mode is FlightMode.MISSION:
+            in_mission.append(vehicle.flight.body.position)
+        return out
+    vehicle.step = stepped
+    halfway(bench, task, 100.0)
+    if lost:
+        bench.line.tampers.append(lambda direction, m, now: [] if (
+            not shown[0] and m.get_type() in ('HEARTBEAT', 'MISSION_CURRENT')) else None)
+    bench.run(limit=0.5)
+    vehicle.rc_mode(RETURN[kind])
+    bench.run(limit=2.5)  # it slows down along the way
+    shown[0] = True
+    assert bench.run(lambda: bench.authority() is AuthorityState.LOST, 5.0)
+    assert bench.hand_over() == ''
+    assert bench.run(lambda: bench.completed() == ['F#0'], 300.0)
+    assert all(min(math.dist(place, p) for p in in_mission) < 10.0 for place in places(task, 5.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
@@ -16,6 +17,7 @@ _SAME = 1.0  # [m] between the ends of a closed way
 LEAST_PART = 1.0  # [m] of a flown part or of a rest
 POSITION_SLACK = 10.0  # [m] of positions that are not exact
 SPEED_MARGIN = 1.2  # factor of a speed: how far a vehicle may have flown
+_KEPT = 64  # positions: 13 s at 5 Hz
 _COURSE_SPEED = 1.0  # [m/s] above which a vehicle has a course
 
 
@@ -37,6 +39,8 @@ class Piece:
     in_silence: bool = False  # its end can have been flown in silence, if it was passed
     way: list[Point] = field(default_factory=list)  # that part in the direction of flight
     way_at: list[float] = field(default_factory=list)  # [m] of each of its points
+    # vehicle time [s] of the latest positions on it, and `flown` before each
+    _followed: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=_KEPT))
 
     def measure(self) -> None:
         """Cut the part that is left out of the path."""
@@ -73,6 +77,7 @@ class Piece:
         """Begin with the whole path again."""
         self.low, self.high, self.flown, self.seen = 0.0, self.at[-1], 0.0, None
         self.off, self.missed, self.gone, self.in_silence = None, False, False, False
+        self._followed.clear()
         self.measure()
 
     def follow(self, sample: PositionSample, before: float, fastest: float, corridor: float,
@@ -95,6 +100,7 @@ class Piece:
         reach = max(SPEED_MARGIN * fastest * gap - back, 0.0) + POSITION_SLACK
         metres = self._metres(sample.position, reach, corridor)
         if metres is not None:
+            self._followed.append((sample.t, self.flown))
             self.flown, self.seen, self.off = max(self.flown, metres), sample.t, None
             self.in_silence = False
             return
@@ -103,6 +109,10 @@ class Piece:
             self.in_silence = True
         # what it flies now it does not fly of the way
         self.off = sample.t, math.dist(sample.position, self.next_point())
+
+    def withdraw(self, until: float) -> None:
+        """Take what it followed later than a vehicle time [s] as not flown."""
+        self.flown = next((flown for t, flown in self._followed if t > until), self.flown)
 
     def continue_at(self, sample: PositionSample, corridor: float) -> bool:
         """Continue at a position on the leg after the points that were passed.
@@ -182,6 +192,7 @@ class Piece:
 
     def commit(self) -> bool:
         """Leave out the flown part from now on; whether there is one."""
+        self._followed.clear()
         if self.flown < LEAST_PART:
             self.flown, self.seen, self.off = 0.0, None, None
             return False

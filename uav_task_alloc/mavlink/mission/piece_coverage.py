@@ -28,6 +28,7 @@ _CORRIDOR, _CORRIDOR_PLANE = 10.0, 150.0  # [m] from a way at which a vehicle st
 _LATE = 32  # positions: six seconds, by which the report of the current item may be late
 _RECENT = 512  # positions in which that report may be late in a simulation that runs faster
 _KEPT = 64  # pieces
+_UNSHOWN = 1.5  # [s] until a vehicle has shown its mode again, where no frame is lost
 
 
 class PieceCoverage:
@@ -168,6 +169,20 @@ class PieceCoverage:
                 self._turn(piece, piece.path, not piece.reversed)
             self._begin(piece, vehicle_now)
             self._partly[task or ''] = None
+
+    def note_left(self, shown_until: float) -> None:
+        """Note that the vehicle is not in mission mode; it may have left that some time ago.
+
+        Args:
+            shown_until: vehicle time [s] until which a frame has shown mission mode: where some
+                were lost since, what was followed later is flown again.
+        """
+        if _UNSHOWN < self._sampled - shown_until < math.inf:
+            for name in (self._under_way, self._ending):
+                piece = self._pieces.get(name or '')
+                if piece is not None:
+                    piece.withdraw(shown_until)
+        self.note_active(None, False)
 
     def _begin(self, piece: Piece, vehicle_now: Callable[[], float]) -> None:
         """Begin to follow a way, on which the vehicle may be for some seconds."""

@@ -273,12 +273,12 @@ class ProgressTable:
     def note_other_mode(self, now: float) -> None:
         """Note that the vehicle is not in mission mode, by whichever command."""
         self._mode.note_other_mode(now)
-        self.coverage.note_active(None, False)
+        self.coverage.note_left(self._mode.shown_until)
 
     def note_mission_left(self, now: float) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
         self._moves.note_mission_left(now)
-        self.coverage.note_active(None, False)
+        self.coverage.note_left(self._mode.shown_until)
 
     def note_reached(self, seq: int, now: float, proven: bool = False,
                      frame: int | None = None) -> None:
