@@ -11,31 +11,22 @@ from dataclasses import replace
 from functools import partial
 
 from uav_task_alloc.allocator.battery_watch import BatteryWatch
-from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.persistence import unsaved_rows
-from uav_task_alloc.allocator.records import Allocation, Outbox, SavedState
+from uav_task_alloc.allocator.plan_publisher import PlanPublisher
+from uav_task_alloc.allocator.records import Outbox, SavedState
 from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning.battery_changes import BatteryChanges
 from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
-from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
-from uav_task_alloc.allocator.replanning.planning import (
-    BuiltLists,
-    build_lists,
-    plan_in_force,
-    replan_problem,
-)
-from uav_task_alloc.allocator.replanning.predictions import Predictions
+from uav_task_alloc.allocator.replanning.planning import build_lists, replan_problem
 from uav_task_alloc.allocator.replanning.proposal import Approvals, holding_plan, split_plan
 from uav_task_alloc.allocator.replanning.schedule import Schedule
-from uav_task_alloc.allocator.replanning.task_reasons import task_steps
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
 from uav_task_alloc.allocator.replanning.waiting_places import WaitingPlaces
 from uav_task_alloc.allocator.separation_watch import SeparationWatch
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.world import World
-from uav_task_alloc.allocator.status import allocation_line, last_finish
 from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.params import AllocatorParams
@@ -86,12 +77,8 @@ class Allocator:
             stop.task.id for each in saved.lists for stop in each.stops if stop.reversed))
         self._learned = saved.learned
         self._learned_saved = now  # [s]
-        self._limiter = ListRateLimiter()
         self._clock = math.inf, now  # published and steady clock [s] of the last tick
-        self._left_out: dict[str, str] = {}  # task id -> reason
-        self._together: tuple[str, ...] = ()  # UAVs that the lists in force do not keep apart
-        self._predictions = Predictions(self.world, now)
-        self._chosen = self._best  # last plan that was put in force
+        self._publisher = PlanPublisher(self.world, self._best, now)
         # UAVs of the journal get time to report before they lose their tasks
         self._awaited = {each.uav for each in saved.lists if each.stops}
         self._wait_until = now + params.uav_timeout
@@ -119,16 +106,16 @@ class Allocator:
         world.publish(world.lists_to_resend(stamp), stamp, resend=True)
         if self._restarted:  # the plan of the previous run is published before any other
             self._restarted = False
-            self._allocate(Plan({}), 'restart', stamp)
+            self._publisher.allocate(Plan({}), 'restart', stamp)
         self._check_hold(now)
         self._check_approval(now, stamp)
-        if self._limiter.due(now):
+        if self._publisher.due(now):
             world.request_replan('deferred lists', now)
         world.forget_ended()
         self._wait_for_tasks(now, stamp)
-        self._predict(now, stamp)
+        self._publisher.predict(now, stamp)
         if world.outbox.statuses:
-            self._step_tasks(stamp)
+            self._publisher.step_tasks(stamp)
 
     def _wait_for_tasks(self, now: float, stamp: float) -> None:
         """Send idle UAVs to waiting places, not while a plan may give them tasks."""
@@ -141,7 +128,7 @@ class Allocator:
             texts = self.waiting.texts()
             for uav_id in published:
                 world.note(f'{uav_id} {texts.get(uav_id, "holds")}')
-            self._publish_allocation(world.lists_in_force().values(), 'waiting places', stamp)
+            self._publisher.allocate_again('waiting places', stamp)
 
     def _end_orders(self, stamp: float) -> None:
         """End the orders whose tasks have ended, and publish the holds that changed."""
@@ -202,11 +189,12 @@ class Allocator:
         built = build_lists(self.world, chosen, stamp)
         lists = {each.uav: built.lists[each.uav] for each in proposal.lists
                  if each.uav in built.lists}
-        left_out = {**self._left_out, **built.left_out}
-        self._publish(replace(built, lists=lists, left_out=left_out, later=self.world.later),
-                      chosen, now, stamp)
-        self._allocate(chosen, f'plan {proposal.revision} accepted by '
-                       f'{operator or "its deadline"}', stamp)
+        left_out = {**self._publisher.left_out, **built.left_out}
+        self._publisher.put(
+            replace(built, lists=lists, left_out=left_out, later=self.world.later), chosen, now,
+            stamp)
+        self._publisher.allocate(chosen, f'plan {proposal.revision} accepted by '
+                                 f'{operator or "its deadline"}', stamp)
 
     def due(self, now: float, stamp: float) -> ReplanProblem | None:
         """Return the problem to solve now, if any; None while one is being solved."""
@@ -267,64 +255,13 @@ class Allocator:
         split = split_plan(world, chosen, trigger, stamp)
         why = self.approvals.propose(split.proposal)
         split.built.left_out.update(dict.fromkeys(split.waiting, why))
-        permitted = self._limiter.permitted(world.lists_in_force(), split.built.lists,
-                                            world.must_change, now, world.params.list_interval)
-        published = self._publish(replace(split.built, lists=permitted), chosen, now, stamp)
+        published = self._publisher.put_permitted(split.built, chosen, now, stamp)
         world.outbox.statuses |= always
         if split.at_once and published:
             trigger = f'{trigger}; without approval for safety: {split.at_once}'
             world.note(trigger)
         if published or always:
-            self._allocate(chosen, trigger, stamp)
-
-    def _publish(self, built: BuiltLists, chosen: Plan, now: float, stamp: float) -> list[str]:
-        """Put lists of a plan in force; returns the UAVs whose lists changed."""
-        world = self.world
-        world.set_built(built.zones_when_built, built.paths_home)
-        world.later = built.later
-        for text in built.together:
-            if text not in self._together:
-                world.note(text, warning=True)
-        self._together = built.together
-        self._left_out = {task_id: world.deadlines.left_out(task_id, reason, stamp)
-                          for task_id, reason in built.left_out.items()}
-        published = world.publish(built.lists, stamp)
-        self._limiter.published(published, now)
-        starts = chosen.timetable().starts if built.later else {}
-        self._predictions.later = {name: stamp + starts[name] for trips in built.later.values()
-                                   for trip in trips for name in trip if name in starts}
-        self._predictions.planned(now, stamp)
-        self._step_tasks(stamp)
-        world.outbox.statuses |= bool(published) or bool(world.tasks.unsaved)
-        return published
-
-    def _step_tasks(self, stamp: float) -> None:
-        """Set the state and the reason of every open task."""
-        world = self.world
-        world.step_tasks(task_steps(world, self._left_out), stamp)
-
-    def _allocate(self, chosen: Plan, trigger: str, stamp: float) -> None:
-        """Publish the lists in force as an allocation."""
-        world = self.world
-        self._chosen = chosen
-        world.plan_revision = world.revision + 1
-        plan = plan_in_force(world.lists, world.tasks, self._left_out, chosen)
-        world.outbox.allocation = Allocation(
-            world.next_revision(), tuple(world.lists_in_force().values()), plan, trigger, stamp)
-        world.note(allocation_line(world.outbox.allocation, last_finish(world, stamp)))
-
-    def _predict(self, now: float, stamp: float) -> None:
-        """Publish predicted times of the lists in force where they are news."""
-        if self._predictions.tick(now, stamp):
-            self._publish_allocation(self._predictions.lists(stamp).values(),
-                                     'predicted arrivals', stamp)
-
-    def _publish_allocation(self, lists: Iterable[UavList], trigger: str, stamp: float) -> None:
-        """Publish the plan in force again, for which no list has got other tasks."""
-        world = self.world
-        plan = plan_in_force(world.lists, world.tasks, self._left_out, self._chosen)
-        world.outbox.allocation = Allocation(world.next_revision(), tuple(lists), plan, trigger,
-                                             stamp)
+            self._publisher.allocate(chosen, trigger, stamp)
 
     def separate(self, now: float, stamp: float) -> MonitorStep:
         """Return holds that keep UAVs apart, and alerts; publish them before lists."""
