@@ -257,6 +257,16 @@ def test_a_number_out_of_range_is_one_line_and_status_1(arguments, text, capsys)
     assert refusal.count('\n') == 1
 
 
+def test_a_negative_number_is_a_value_in_any_spelling(tmp_path, capsys):
+    (tmp_path / 'south.csv').write_text('id,latitude,longitude\nt1,-33.9,151.2\n')
+    assert cli.main(['import', str(tmp_path / 'south.csv'), '--origin', '-33.9,151.2,0',
+                     '--output', str(tmp_path / 'south.yaml')]) == 0
+    assert '-33.9' in (tmp_path / 'south.yaml').read_text()
+    capsys.readouterr()
+    for low in ('-1e2', '-.5', '-100'):
+        assert cli.main(['plan', FILE, '--budget', '0', '--altitude-min', low]) == 0
+
+
 @pytest.mark.parametrize('arguments', [[], ['-h']], ids=str)
 def test_the_help_lists_every_command(arguments, capsys):
     with contextlib.suppress(SystemExit):

@@ -13,6 +13,9 @@ from uav_task_alloc.cli.commands import main
     (['accept', 'x'], "accept: 'x': expected the revision of a proposal"),
     (['land', 'a'], "'land'"),
     (['pin', 't1', 'a', '--why'], '--why'),
+    (['pause', 'a', '--clear'], '--clear: expected with pin or forbid, not pause'),
+    (['return', 'a', '--clear'], '--clear: expected with pin or forbid, not return'),
+    (['pin', 't1', 'a', '--keep-tasks'], '--keep-tasks: expected with pause, not pin'),
 ])
 def test_malformed_arguments_are_one_line(argv, text, capsys):
     with pytest.raises(SystemExit) as caught:

@@ -6,6 +6,7 @@ import json
 import pytest
 
 from uav_task_alloc.cli import report
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
 from uav_task_alloc.record.record_file import RECORD_FILE
@@ -141,6 +142,13 @@ def test_the_report_command_prints_the_table_and_draws_the_map(run, tmp_path, ca
         assert report.main([str(place)]) == 0
         assert wall in capsys.readouterr().out
     assert (tmp_path / 'map.png').stat().st_size > 10_000
+
+
+def test_the_report_command_refuses_to_draw_a_demo_as_a_page(run, tmp_path):
+    (tmp_path / 'summary.json').write_text(json.dumps({**run(ALL_DONE), 'wall_s': 77.0}))
+    with pytest.raises(InvalidValue, match=r'--html = .*expected a recording, FILE.mcap'):
+        report.main([str(tmp_path), '--html', str(tmp_path / 'page.html')])
+    assert not (tmp_path / 'page.html').exists()
 
 
 def test_the_report_command_refuses_a_folder_without_a_run(tmp_path, monkeypatch):

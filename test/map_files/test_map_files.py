@@ -236,10 +236,10 @@ def test_a_plan_of_qgroundcontrol(tmp_path):
     assert scenario.origin == ORIGIN
     assert [timed.zone.id for timed in scenario.zones] == ['circle_1', 'polygon_1']
     assert notes == [
-        'job.plan: item 1: a take-off, which missions get of their own',
+        'job.plan: item 1: a take-off, which is no task: the bridge flies its own',
         'job.plan: item 4: command 206 is none of 16, 19, 82',
         'job.plan: item 5: a fwLandingPattern is no survey, corridor or structure scan',
-        'job.plan: item 6: a return, which missions get of their own',
+        'job.plan: item 6: a return, which is no task: the bridge flies its own',
         'job.plan: fence polygon 2: it includes: expected an excluding one, see fence_area']
 
 

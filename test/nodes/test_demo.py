@@ -77,6 +77,14 @@ def test_finding_34_the_results_of_the_last_demo_are_removed(tmp_path, no_nodes)
         (out / 'summary.json').write_text('{}')
 
 
+def test_a_recording_has_the_name_of_one(tmp_path, capsys, no_nodes):
+    out = str(tmp_path / 'out')
+    with pytest.raises(Started):
+        demo.main(['--out', out, '--record', str(tmp_path / 'demo.mcap')])
+    assert demo.main(['--out', out, '--record', str(tmp_path / 'demo.rec')]) == 1
+    assert 'expected a name that ends with .mcap' in capsys.readouterr().err
+
+
 _SIGNAL_IN_AN_IMPORT = """
 import signal, sys
 from uav_task_alloc.nodes import demo

@@ -136,3 +136,11 @@ def test_the_command_gives_orders_and_prints_their_log(fleet, tmp_path):
     assert log.returncode == 0
     assert '  bob  order b: t2 t3; before: t2 ASSIGNED on a; t3 ASSIGNED on b' in log.stdout
     assert '  bob  return a, b; before: ' in log.stdout
+
+
+def test_a_name_that_no_node_can_have_is_one_line():
+    done = subprocess.run([sys.executable, '-m', 'uav_task_alloc', 'order', 'pause', 'a',
+                           '--allocator', 'bad name'], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1
+    assert done.stderr.count('\n') == 1
+    assert "--allocator = 'bad name': expected the full name of a node" in done.stderr

@@ -32,6 +32,8 @@ class OptionParser(argparse.ArgumentParser):
         super().__init__(prog=f'uav_task_alloc {command}'.rstrip(), description=description,
                          epilog=epilog, formatter_class=_Formatter)
         self.register('type', Path, _path)
+        # so that -33.9,151.2,0 and -1e2 are values, not options
+        self._negative_number_matcher = re.compile(r'-\.?\d')
         self._ranges: dict[str, tuple[str, float, float, str]] = {}
 
     def number(self, option: str, low: float, high: float, text: str, *, unit: str = '',

@@ -67,6 +67,10 @@ def main(argv: Sequence[str]) -> int:
     action = _ACTIONS[args.action]
     if not action.least <= len(args.names) <= action.most:
         parser.error(f"{args.action}: {' '.join(args.names)!r}: expected {action.names}")
+    for given, option, actions in ((args.clear, '--clear', ('pin', 'forbid')),
+                                   (args.keep_tasks, '--keep-tasks', ('pause',))):
+        if given and args.action not in actions:
+            parser.error(f'{option}: expected with {" or ".join(actions)}, not {args.action}')
     if args.action == 'log':
         return _print_log(args.names[0])
     if args.action in ('accept', 'reject') and not args.names[0].isdecimal():
@@ -74,7 +78,7 @@ def main(argv: Sequence[str]) -> int:
     request: dict[str, object] = {
         'operator_name': args.operator, 'dry_run': args.dry_run, 'revision': args.revision,
         **_fields(args.action, args.names)}
-    request |= {'clear': True} if args.clear and args.action in ('pin', 'forbid') else {}
+    request |= {'clear': True} if args.clear else {}
     request |= {'keep_tasks': args.keep_tasks} if args.action == 'pause' else {}
     try:
         client = import_module(_CLIENT)

@@ -286,6 +286,9 @@ def main(argv: Sequence[str]) -> int:
     args = parser.parsed(argv)
     place = args.place
     if place.is_dir() or place.suffix == '.json':
+        if args.html:
+            raise InvalidValue('--html', str(args.html), 'a recording, FILE.mcap, to draw: '
+                               f'{place} is of a demo, whose table is printed')
         return demo_table(place, args.map)
     return flight_page(place, args.html or Path(f'{str(place).removesuffix(".mcap")}.html'),
                        args.map)

@@ -96,7 +96,7 @@ def why_no_task(command: int) -> str:
         command: number of a MAVLink command that is not in TASK_COMMANDS.
     """
     if command in _NOT_TASKS:
-        return f'a {_NOT_TASKS[command]}, which missions get of their own'
+        return f'a {_NOT_TASKS[command]}, which is no task: the bridge flies its own'
     return f'command {command} is none of {", ".join(map(str, TASK_COMMANDS))}'
 
 

@@ -250,7 +250,7 @@ def _run(argv: list[str] | None) -> int:
     args = parser.parsed(sys.argv[1:] if argv is None else argv)
     if args.record and args.record.exists():
         raise InvalidValue('--record', str(args.record), 'a file that does not exist')
-    check_file('--record', args.record)
+    check_file('--record', args.record, ('.mcap',))
     # several demos on one machine, or in one network, must not exchange messages
     os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain(1 + os.getpid() % 100)))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

@@ -7,9 +7,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import rclpy
+from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from uav_task_alloc_msgs import srv
+
+from uav_task_alloc.errors import InvalidValue
 
 _SERVICES: dict[str, Any] = {
     'pin_task': srv.PinTask, 'forbid_task': srv.ForbidTask, 'order_tasks': srv.OrderTasks,
@@ -30,6 +33,9 @@ def call(allocator: str, service: str, fields: Mapping[str, object],
 
     Returns:
         Whether it was done, and a text with the price where there is one.
+
+    Raises:
+        InvalidValue: that is no name of a node.
     """
     kind = _SERVICES[service]
     name = f'{allocator.rstrip("/")}/{service}'
@@ -38,7 +44,11 @@ def call(allocator: str, service: str, fields: Mapping[str, object],
     node = Node('order', use_global_arguments=False)
     executor.add_node(node)
     try:
-        client = node.create_client(kind, name)
+        try:
+            client = node.create_client(kind, name)
+        except NameValidationException:
+            raise InvalidValue('--allocator', allocator, 'the full name of a node, such as '
+                               '/allocator') from None
         if not _spin_until(executor, client.service_is_ready, timeout):
             return False, f'{name}: no such service in {timeout:g} s: does the allocator run?'
         _spin_until(executor, lambda: False, _SETTLE)
