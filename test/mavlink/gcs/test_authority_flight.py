@@ -20,6 +20,8 @@ from authority_bench import (
     status_is,
     suspended,
 )
+from findings_bench import drop_messages
+from flight_bench import FlightBench
 from mission_bench import OURS, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -238,3 +240,23 @@ def test_delayed_commands_of_another_station_are_not_taken_for_ours(kind):
     bench.run(limit=12.0)
     assert bench.authority() is L
     assert sends_no_command(bench, 40.0)
+
+
+def test_an_upload_begun_on_the_ground_does_not_replace_the_mission_that_a_pilot_flies():
+    bench = FlightBench('px4', takeoff=False).discover()
+    vehicle, lost = bench.vehicles[1], [True]
+    bench.assign(task_list('ABCDEF'))
+    assert bench.run(lambda: bench.onboard().verified(), 20.0)
+    before = vehicle.mission.items[:]
+    vehicle.rc_mode(px4_mode(4, 4))
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT', lambda m: lost[0] and m.seq >= 3)
+    bench.run(limit=3.0)
+    bench.assign(task_list('UVWXYZ', 2))
+    assert bench.run(lambda: bench.onboard().upload.busy, 10.0)
+    vehicle.rc_arm(True)
+    assert bench.run(lambda: bench.executor().telemetry.airborne, 10.0)
+    lost[0], sent = False, len(bench.line.sent('MISSION_ITEM_INT'))
+    bench.run(limit=30.0)
+    assert bench.authority() is N
+    assert len(bench.line.sent('MISSION_ITEM_INT')) == sent
+    assert vehicle.mission.items == before

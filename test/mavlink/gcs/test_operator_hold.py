@@ -8,6 +8,7 @@ from authority_bench import MODES
 from findings_bench import drop_messages, listed
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
@@ -215,3 +216,59 @@ def test_px4_does_not_take_a_list_to_whose_first_task_a_zone_is_now_between():
     bench.assign(listed(2, T=(0.0, 300.0), U=(0.0, 400.0)))
     assert bench.run(lambda: bench.completed() == ['T', 'U'], 200.0)
     assert least[0] > zone.radius
+
+
+def refused_arming(kind):
+    """A vehicle on the ground whose arming is refused, and what ends that."""
+    bench = FlightBench(kind).discover()
+    flight = bench.vehicles[1].flight
+    arm, flight.arm = flight.arm, lambda force=False: False
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.executor().sender.waits_for.startswith('arm'), 30.0)
+    return bench, lambda: setattr(flight, 'arm', arm)
+
+
+def stays_on_the_ground(bench):
+    return not bench.run(lambda: bench.executor().telemetry.airborne or (
+        bench.vehicles[1].flight.armed), 30.0) and bench.authority() is AuthorityState.HELD
+
+
+@BOTH
+@pytest.mark.parametrize('source', ['operator', 'separation'])
+def test_one_whose_arming_is_refused_does_not_take_off_while_it_is_held(kind, source):
+    bench, allow = refused_arming(kind)
+    hold(bench, HoldRequest(source, True, 'order o1'))
+    bench.run(limit=5.0)
+    allow()
+    assert stays_on_the_ground(bench)
+    hold(bench, HoldRequest(source, False))
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+
+
+@BOTH
+def test_one_that_is_armed_but_has_not_taken_off_is_disarmed_by_a_hold(kind):
+    bench, lost = FlightBench(kind).discover(), [True]
+    drop_messages(bench, 'up', 'COMMAND_LONG', lambda m: lost[0] and (
+        m.command == d.MAV_CMD_NAV_TAKEOFF))
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.executor().telemetry.armed, 30.0)
+    hold(bench)
+    bench.run(limit=3.0)
+    lost[0] = False
+    assert stays_on_the_ground(bench)
+    hold(bench, GO_ON)
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+
+
+@BOTH
+def test_one_whose_arming_is_refused_is_not_armed_under_a_new_zone(kind):
+    bench, allow = refused_arming(kind)
+    policy = bench.executor().policy
+    bench.executor().policy = dataclasses.replace(policy, zones=(
+        ThreatZone.cylinder('farm', (0.0, 10.0), 30.0),))
+    bench.run(limit=5.0)
+    allow()
+    assert stays_on_the_ground(bench)
+    assert bench.executor().sender.waits_for.startswith('zone farm to be removed')
+    bench.executor().policy = policy
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])

@@ -108,7 +108,7 @@ class MissionExecutor:
     def _in_order(self, execution: ListExecution) -> tuple[Callable[[float], NextMessages], ...]:
         """The rules: the first that is not satisfied returns its messages."""
         takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
-                          lambda: self.policy, self.fence.missing)
+                          lambda: self.policy, lambda: self.holds.reason, self.fence.missing)
         transfers = MissionTransfers(self.sender, self.telemetry, self.onboard, self.authority,
                                      self._end_of_list)
         return (
@@ -277,8 +277,9 @@ class MissionExecutor:
             self.sender.drop()
         if not self.authority.allows(SendAction.READ):
             return self.sender.wait_for(f'authority: {self.authority.why}')
-        if not self.authority.allows(SendAction.UPLOAD) and self.onboard.state is (
-                MissionState.UPLOADING):
+        # begun on the ground, it would replace the mission that a pilot flies now
+        ends = self.telemetry.airborne or not self.authority.allows(SendAction.UPLOAD)
+        if ends and self.onboard.state is MissionState.UPLOADING:
             self.onboard.abort()
         return None
 

@@ -21,6 +21,7 @@ class Takeoff:
         onboard: its mission and list.
         authority: over the vehicle.
         policy: returns the present parameters.
+        held_by: who holds it, and why; '': nobody.
         fence_missing: what its fence lacks for a take-off; '': nothing.
     """
 
@@ -31,11 +32,12 @@ class Takeoff:
         onboard: OnboardMission,
         authority: Authority,
         policy: Callable[[], Policy],
+        held_by: Callable[[], str] = lambda: '',
         fence_missing: Callable[[], str] = lambda: '',
     ) -> None:
         self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
         self._authority, self._policy = authority, policy
-        self._fence_missing = fence_missing
+        self._held_by, self._fence_missing = held_by, fence_missing
 
     def continue_takeoff(self, now: float) -> NextMessages:
         """Let a vehicle that we armed take off before anything else is sent, or disarm it."""
@@ -53,22 +55,19 @@ class Takeoff:
         if not self._authority.held:
             return sender.wait('~/hand_over: it has landed' if self._authority.landed else
                                'a pilot to arm and take off (takeoff is false)')
-        if policy.grounded and not sender.climbing:
-            return sender.wait(policy.grounded)
-        missing = self._fence_missing()
-        if missing and not sender.climbing:
-            return sender.wait(missing)
-        departure = self._departure()
-        if departure and not sender.climbing:
-            return sender.wait_for(departure)
-        home = telemetry.home or telemetry.position
-        zone = zone_across_path(home, home, policy.zones)
-        if zone is not None and not sender.climbing:
-            return sender.wait(f'zone {zone.id} to be removed: it covers the home')
+        if not sender.climbing:
+            why = policy.grounded or self._fence_missing()
+            if why:
+                return sender.wait(why)
+            if departure := self._departure():
+                return sender.wait_for(departure)
+            if zone := self._zone_over_home():
+                return sender.wait(zone)
         return sender.take_off(policy.cruise_altitude, self._wants_to_fly, now)
 
     def _wants_to_fly(self) -> bool:
-        stays = self._policy().grounded or self._fence_missing() or self._departure()
+        stays = (self._held_by() or self._policy().grounded or self._fence_missing()
+                 or self._departure() or self._zone_over_home())
         return (self._authority.held and self._onboard.tasks is not None
                 and not (stays and not self._telemetry.airborne)
                 and bool(self._onboard.remaining().stops))
@@ -76,3 +75,9 @@ class Takeoff:
     def _departure(self) -> str:
         """The departure that a vehicle on the ground waits for; '': it is due."""
         return self._onboard.list.waits.grounded(self._policy().clock)
+
+    def _zone_over_home(self) -> str:
+        """The zone over its home that it waits for; '': there is none."""
+        home = self._telemetry.home or self._telemetry.position
+        zone = zone_across_path(home, home, self._policy().zones)
+        return '' if zone is None else f'zone {zone.id} to be removed: it covers the home'
