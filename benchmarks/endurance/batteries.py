@@ -245,7 +245,7 @@ class Fleet:
             self.figures['back'] += 1
         if self.core is None:
             return
-        if executor.telemetry.stale(self.now) or executor.telemetry.position_at < 0.0:
+        if executor.telemetry.link.stale(self.now) or executor.telemetry.position_at < 0.0:
             return
         known = not math.isnan(status.battery)
         self.core.world.update_uav(UavReport(

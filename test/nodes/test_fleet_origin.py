@@ -2,9 +2,10 @@
 """Nodes whose origins differ refuse to fly, say so, and go on when they agree."""
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from std_srvs.srv import Trigger
 from test_allocator import Fleet, S, add, begin, task
 from test_mavlink_bridge import Sky
-from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs import msg as m, srv
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes.conversions.messages import LATCHED
@@ -102,6 +103,38 @@ def test_finding_37_an_allocator_resumes_planning_when_the_other_origin_disappea
     probe.until(lambda: any('refuses to plan' in each for each in messages(health)))
     assert fleet.route('a') is None
     probe.node.destroy_publisher(other)
+    probe.until(lambda: fleet.route('a') == ['t0'])
+
+
+def test_while_origins_differ_holds_are_published_and_orders_by_lists_are_refused(start, probe):
+    fleet = Fleet(probe)
+    other = publish_origin_first(probe)
+    node = begin(start, fleet)
+    probe.until(lambda: 'refuses to plan: fleet_origin' in node.output())
+    fleet.uav('a', 0.0)
+    holds = probe.collect(m.UavHold, 'a/hold', LATCHED)
+
+    def paused():
+        return probe.call(srv.PauseUav, 'allocator/pause_uav', srv.PauseUav.Request(
+            uav_id='a', keep_tasks=True)).success
+
+    probe.until(paused)  # once the UAV has reported
+    probe.until(lambda: holds and holds[-1].hold)
+    probe.until(lambda: 'unnamed: pause a' in node.output())
+    for kind, name, request in (
+            (srv.ReturnUav, 'return_uav', srv.ReturnUav.Request(uav_id='a')),
+            (srv.PinTask, 'pin_task', srv.PinTask.Request(uav_id='a', task_id='t0')),
+            (srv.ApprovePlan, 'approve_plan', srv.ApprovePlan.Request(accept=True))):
+        answer = probe.call(kind, f'allocator/{name}', request)
+        assert not answer.success
+        assert answer.message.startswith('refused: nothing is planned: fleet_origin of another')
+    replan = probe.call(Trigger, 'allocator/replan', Trigger.Request())
+    assert (replan.success, replan.message[:33]) == (False, 'nothing is planned: fleet_origin ')
+    assert probe.call(srv.ResumeUav, 'allocator/resume_uav',
+                      srv.ResumeUav.Request(uav_id='a')).success
+    probe.until(lambda: not holds[-1].hold)
+    probe.node.destroy_publisher(other)
+    fleet.tasks.publish(add(task('t0', 100)))
     probe.until(lambda: fleet.route('a') == ['t0'])
 
 

@@ -272,6 +272,12 @@ class Allocator:
         out, self.world.outbox = self.world.outbox, Outbox()
         return out
 
+    def collect_holds(self) -> Outbox:
+        """As `collect`, but only holds and lines of the log, which hold in any ENU frame."""
+        box = self.world.outbox
+        out, box.holds, box.notes = Outbox(holds=box.holds, notes=box.notes), {}, []
+        return out
+
     def rows(self, most: int | None = None) -> list[JournalRow]:
         """Return what is not on disk, at most `most` tasks of it; `written` confirms it."""
         return unsaved_rows.rows(self.world, self._best.state, most)

@@ -204,9 +204,12 @@ class RequestCheck:
 
 
 def refused(why: str) -> OrderAnswer:
-    """The answer to a request that is refused.
+    """Return the answer to a request that is refused.
 
     Args:
         why: value, expectation and place.
+
+    Returns:
+        Without success, and without a price.
     """
     return OrderAnswer(False, f'refused: {why}')

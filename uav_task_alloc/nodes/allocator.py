@@ -116,7 +116,8 @@ class AllocatorNode(Node):
         self.publisher = AllocationPublisher(self, self.world)
         self.publisher.prepare(self.world.lists_in_force())
         self.markers = MarkerPublisher(self, self.world)
-        self.orders = OrderServices(self, self.core, self.save, self.stamp)
+        self.orders = OrderServices(self, self.core, self.save, self.stamp,
+                                    self.origins.conflict)
         self.diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.inputs: list[Subscription[Any]] = [
             subscribe_batched(self, m.UavState, 'uav_states', self.on_state, INPUT_STATES),
@@ -208,7 +209,10 @@ class AllocatorNode(Node):
     def on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Plan again without a change."""
         self.world.request_replan('replan service', time.monotonic())
-        response.success, response.message = True, 'a new plan follows on `allocation`'
+        conflict = self.origins.conflict()
+        response.success = not conflict
+        response.message = (f'nothing is planned: {conflict}' if conflict
+                            else 'a new plan follows on `allocation`')
         return response
 
     def on_forget_demand(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -307,19 +311,21 @@ class AllocatorNode(Node):
         self.pause_after(started)
 
     def publish(self, stamp: float) -> None:
-        """Save changes, then publish them while all nodes have one origin.
+        """Save changes, then publish them; only holds while the origins of nodes differ.
 
         Holds that keep UAVs apart do not wait for the disk.
         """
-        if not self.origins.conflict():
-            self.orders.separate(self.core.separate(time.monotonic(), stamp))
+        self.orders.separate(self.core.separate(time.monotonic(), stamp))
         self.pending = not self.persistence.save(self.core, time.monotonic(), _MOST_ROWS)
-        if self.pending or self.origins.conflict():
+        if self.pending:
             return
-        outbox = self.core.collect()
+        conflict = self.origins.conflict()
+        outbox = self.core.collect_holds() if conflict else self.core.collect()
         self.log_notes(outbox.notes)
         self.publisher.enqueue(outbox)
         self.orders.publish(outbox)
+        if conflict:
+            return
         self.pending = self.publisher.publish_some(stamp)
         self.markers.update(outbox)
 

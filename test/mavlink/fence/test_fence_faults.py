@@ -4,11 +4,13 @@ import math
 from dataclasses import replace
 
 import pytest
+from authority_bench import MODES
 from fence_bench import ENABLED, FENCE, FIELD, TOWER, FenceBench, FenceState
 from mission_bench import ack, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.fence.shapes import CIRCLES
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.sim.stored_item import StoredItem
 
@@ -283,3 +285,53 @@ def test_a_restarted_bridge_knows_its_own_fence_by_its_files(tmp_path):
     bench.start()
     bench.settle(FenceState.FOREIGN)
     assert any('counts as that of another station' in note for note in bench.notes)
+
+
+# a flight of a pilot, which the bridge was not granted
+
+def with_pilot(kind):
+    """On the ground in a stick mode, with its fence; the bridge was never granted anything."""
+    bench = FenceBench(kind, takeoff=False)
+    bench.vehicle.rc_mode(MODES[kind].stick)
+    return bench.settle()
+
+
+def flown_by_pilot(bench):
+    """A pilot arms and climbs by hand."""
+    assert bench.vehicle.rc_arm(True)
+    bench.vehicle.rc_stick((0.0, 0.0, 3.0))
+    bench.run(limit=6.0)
+    assert bench.executor().telemetry.airborne
+    assert bench.authority() is AuthorityState.NONE
+
+
+@BOTH
+def test_a_new_zone_is_not_uploaded_while_a_pilot_flies_but_after_the_landing(kind):
+    bench = with_pilot(kind)
+    flown_by_pilot(bench)
+    stored, start = list(bench.held), len(bench.sent('MISSION_COUNT'))
+    bench.set_zones(TOWER)
+    bench.run(limit=20.0)
+    assert bench.held == stored
+    assert len(bench.sent('MISSION_COUNT')) == start
+    bench.vehicle.rc_stick((0.0, 0.0, -3.0))
+    assert bench.run(lambda: bench.vehicle.flight.landed, 60.0)
+    bench.vehicle.rc_stick(None)
+    assert bench.run(lambda: len(bench.vehicle.fence.shapes) == 1, 60.0)
+
+
+@BOTH
+def test_an_upload_of_a_fence_ends_once_a_pilot_flies(kind):
+    bench = with_pilot(kind)
+    lost = [True]
+    bench.line.tampers.append(lambda direction, m, now: [] if lost[0] and direction == 'up' and (
+        m.get_type() == 'MISSION_ITEM_INT') and m.mission_type == FENCE else None)
+    bench.set_zones(TOWER)
+    assert bench.run(bench.state_is(FenceState.UPLOADING), 20.0)
+    flown_by_pilot(bench)
+    lost.clear()
+    lost.append(False)
+    start = len(bench.sent('MISSION_ITEM_INT'))
+    bench.run(limit=20.0)
+    assert len(bench.sent('MISSION_ITEM_INT')) == start
+    assert bench.fence.state is not FenceState.UPLOADING

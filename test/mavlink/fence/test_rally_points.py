@@ -3,12 +3,14 @@
 from dataclasses import replace
 
 import pytest
+from authority_bench import MODES
 from fence_bench import FenceBench, FenceState
 from mission_bench import ORIGIN, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.fence.rally import choose_rally
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.nodes.conversions.bridge_parameters import to_rally_points
 from uav_task_alloc.sim.config import FlightMode
@@ -93,3 +95,20 @@ def test_fence_and_rally_points_follow_each_other(kind):
     assert bench.run(lambda: bench.fence.rally.transfer.state is FenceState.VERIFIED)
     assert bench.fence.verified
     assert not bench.both_busy
+
+
+@BOTH
+def test_rally_points_are_not_uploaded_while_a_pilot_flies(kind):
+    bench = rally_bench(kind, zones=(), takeoff=False)
+    bench.vehicle.rc_mode(MODES[kind].stick)
+    bench.discover()
+    assert bench.run(lambda: bench.fence.rally.transfer.state is FenceState.VERIFIED, 60.0)
+    assert bench.vehicle.rc_arm(True)
+    bench.vehicle.rc_stick((0.0, 0.0, 3.0))
+    bench.run(limit=6.0)
+    assert bench.executor().telemetry.airborne
+    assert bench.authority() is AuthorityState.NONE
+    stored = list(bench.vehicle.mission.stores[RALLY])
+    bench.executor().policy = replace(bench.executor().policy, rally=(EAST,))
+    bench.run(limit=20.0)
+    assert bench.vehicle.mission.stores[RALLY] == stored

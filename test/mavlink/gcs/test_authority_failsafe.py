@@ -315,6 +315,50 @@ def test_a_foreign_mission_on_a_vehicle_that_is_not_held_changes_nothing(kind, s
 
 
 @BOTH
+def test_a_foreign_mission_on_the_ground_is_left_though_nothing_was_granted(kind):
+    bench = on_ground(kind, N)
+    bench.assign(task_list('AB', 2))
+    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 20.0)
+    bench.run(limit=5.0)
+    upload_by_another(bench, items=7)
+    assert bench.run(lambda: bench.onboard().mission.is_foreign, 70.0)
+    stored, start = list(bench.vehicles[1].mission.items), len(bench.sent)
+    bench.assign(task_list('ZY', 3))
+    bench.run(limit=100.0)
+    assert bench.vehicles[1].mission.items == stored
+    assert {action for _, action, _ in bench.sent[start:]} <= {'read'}
+    assert bench.authority() is N
+    assert bench.state().reason == (
+        'somebody else changed the mission: yield; given back by our mission on board, or '
+        'when_foreign: reassert')
+    bench.set_policy(when_foreign='reassert')
+    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 20.0)
+    assert bench.state().available
+
+
+@BOTH
+def test_a_pilot_who_flies_a_mission_of_another_station_is_not_held(kind):
+    bench = on_ground(kind, N)
+    bench.assign(task_list('AB', 2))
+    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 20.0)
+    bench.run(limit=5.0)
+    upload_by_another(bench, items=7)
+    assert bench.run(lambda: bench.onboard().mission.is_foreign, 70.0)
+    start, vehicle = len(bench.sent), bench.vehicles[1]
+    vehicle.rc_mode(MODES[kind].stick)
+    assert vehicle.rc_arm(True)
+    vehicle.rc_stick((0.0, 0.0, 3.0))
+    bench.run(limit=8.0)
+    vehicle.rc_stick(None)
+    bench.run(limit=4.0)
+    vehicle.rc_mode(MODES[kind].mission)
+    bench.run(limit=20.0)
+    assert bench.commands(start) == []
+    assert vehicle.flight.custom_mode == MODES[kind].mission
+    assert bench.authority() is S
+
+
+@BOTH
 def test_a_foreign_mission_that_its_station_starts_again_stays_foreign(kind):
     bench = suspended(kind, Suspension.FOREIGN)
     bench.from_station(set_mode(MODES[kind].mission, kind))

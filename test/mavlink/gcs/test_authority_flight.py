@@ -98,8 +98,11 @@ def test_a_pilot_in_control_may_set_any_mode(kind, mode, state):
 
 
 def climbing(kind, mode):
-    """On the ground in a mode, then taken off by the bridge; no heartbeat has shown TAKEOFF."""
-    bench = AuthorityBench(kind, tick=0.1)
+    """On the ground in a mode, then taken off by the bridge; no heartbeat has shown TAKEOFF.
+
+    The climb is short: 5 s without a heartbeat are a stale link.
+    """
+    bench = AuthorityBench(kind, tick=0.1, cruise_altitude=8.0)
     bench.vehicles[1].rc_mode(mode)
     bench.discover()
     bench.line.tampers.append(lambda direction, m, now: [] if m.get_type() == 'HEARTBEAT' and (

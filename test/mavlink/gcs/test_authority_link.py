@@ -130,6 +130,54 @@ def test_another_mode_after_silence_while_suspended_is_a_loss(kind):
     assert status_is(bench, L)
 
 
+def lose_heartbeats(bench):
+    """Only the heartbeats of the vehicle are lost from now on."""
+    bench.line.tampers.append(drop({'HEARTBEAT'}, 1 << 30))
+
+
+@BOTH
+def test_without_heartbeats_nothing_is_sent_though_other_messages_arrive(kind):
+    bench = flying(kind)
+    lose_heartbeats(bench)
+    bench.run(limit=6.0)
+    assert status_is(bench, S, 'no heartbeat for 5 s')
+    assert bench.state().reason == 'its link is stale'
+    start = len(bench.sent)
+    bench.assign(task_list('ZYX', 2))
+    bench.run(limit=10.0)
+    assert bench.sent[start:] == []
+    bench.line.tampers.clear()
+    assert bench.reaches(H, 1.5)
+    assert bench.run(lambda: bench.completed()[-3:] == ['Z', 'Y', 'X'], 200.0)
+
+
+@BOTH
+def test_a_pilot_who_takes_over_while_only_heartbeats_are_lost_keeps_it(kind):
+    bench = flying(kind)
+    lose_heartbeats(bench)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    bench.run(limit=6.0)
+    start = len(bench.sent)
+    bench.assign(task_list('ZYX', 2))
+    bench.run(limit=20.0)
+    assert bench.sent[start:] == []
+    assert bench.vehicles[1].flight.custom_mode == MODES[kind].stick
+    bench.line.tampers.clear()
+    bench.run(limit=1.5)
+    assert status_is(bench, L, 'the link is back, in ', ' instead of ')
+    assert sends_no_command(bench)
+
+
+@BOTH
+def test_without_heartbeats_another_address_does_not_take_its_place(kind):
+    bench = flying(kind)
+    lose_heartbeats(bench)
+    bench.run(limit=6.0)
+    bench.move_address()
+    bench.run(limit=0.5)
+    assert not any('new address' in note for note in bench.notes)
+
+
 # a new address
 
 @BOTH

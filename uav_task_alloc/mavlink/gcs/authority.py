@@ -164,11 +164,12 @@ _SUSPENDS = {_E.AVOIDING: Suspension.AVOID, _E.FAILSAFE_STAYS: Suspension.FAILSA
 _ENDS = {_E.AVOIDED: Suspension.AVOID, _E.FAILSAFE_OVER: Suspension.FAILSAFE,
          _E.LINK_BACK: Suspension.LINK, _E.FOREIGN_OVER: Suspension.FOREIGN,
          _E.EXPLAINED: Suspension.UNEXPLAINED, _E.RESTART_AGREES: Suspension.RESTART}
+OUR_MISSION = 'our mission on board, or when_foreign: reassert'  # ends a yield
 _GIVEN_BACK_BY = {
     Suspension.LINK: 'the link, with the mode unchanged',
     Suspension.AVOID: 'the vehicle, back in MISSION mode',
     Suspension.FAILSAFE: 'the end of the failsafe',
-    Suspension.FOREIGN: 'our mission on board, or when_foreign: reassert',
+    Suspension.FOREIGN: OUR_MISSION,
     Suspension.UNEXPLAINED: 'a message that explains the change of mode',
     Suspension.RESTART: 'a heartbeat with the mode unchanged'}
 _AFTER_KILL = (_E.HAND_OVER,)  # the only events that lead to HELD after a kill

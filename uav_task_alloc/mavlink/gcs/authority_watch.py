@@ -80,6 +80,11 @@ class AuthorityWatch:
         return self._link.was_lost
 
     @property
+    def yields(self) -> bool:
+        """Whether a mission of another station is on board, and is to be left."""
+        return self._evidence.foreign() and self._policy().when_foreign == 'yield'
+
+    @property
     def marks(self) -> dict[str, TaskMark]:
         """Tasks that were flown or skipped, by id."""
         return self._recorder.marks
@@ -140,8 +145,7 @@ class AuthorityWatch:
         self._arming.step(now)
         self._climb.step(now)
         self._grant.step(now)
-        foreign = self._evidence.foreign() and self._policy().when_foreign == 'yield'
-        check_foreign(self._state, foreign, now)
+        check_foreign(self._state, self.yields, now)
         self._save_record()
 
     def address_changed(self, now: float) -> None:

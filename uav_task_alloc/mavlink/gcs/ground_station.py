@@ -128,7 +128,7 @@ class GroundStation:
             return []
         if session.address != address:
             # with a duplicate id, one vehicle would get the mission of the other
-            if not session.executor.telemetry.stale(now):
+            if not session.executor.telemetry.link.silent(now):
                 session.strays += 1
                 return []
             session.address = address
@@ -220,8 +220,8 @@ class GroundStation:
             for executor in executors:
                 executor.onboard.list.perhaps_flown = frozenset()
             return
-        unread = [executor for executor in executors
-                  if not executor.onboard.resume.located and not executor.telemetry.stale(now)]
+        unread = [executor for executor in executors if not (
+            executor.onboard.resume.located or executor.telemetry.link.stale(now))]
         for executor in executors:
             executor.onboard.list.perhaps_flown = frozenset(
                 task for other in unread if other is not executor

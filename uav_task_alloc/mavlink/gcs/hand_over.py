@@ -47,7 +47,7 @@ class HandOver:
 
     def _refusal(self, now: float) -> str:
         state, telemetry, authority = self._state, self._state.telemetry, self._state.authority
-        if telemetry.stale(now) or state.mode is None:
+        if telemetry.link.stale(now) or state.mode is None:
             return 'its link is stale'
         if state.status >= d.MAV_STATE_CRITICAL and not authority.killed:
             return 'a failsafe is active'

@@ -13,7 +13,7 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import (
     AuthorityWatchState,
     UnexplainedChange,
 )
-from uav_task_alloc.mavlink.gcs.telemetry import STALE
+from uav_task_alloc.mavlink.gcs.link_times import STALE
 
 _HEARTBEAT_DELAY = 1.0  # [s]; one received later than that after a boot was sent after it
 
@@ -35,10 +35,10 @@ class LinkLoss:
     def step(self, now: float) -> None:
         """Detect a stale link."""
         state, telemetry = self._state, self._state.telemetry
-        self.was_lost = state.unconfirmed and (self.was_lost or telemetry.lost(now))
-        if telemetry.stale(now) and not state.unconfirmed and state.mode is not None:
+        self.was_lost = state.unconfirmed and (self.was_lost or telemetry.link.lost(now))
+        if telemetry.link.stale(now) and not state.unconfirmed and state.mode is not None:
             self._expect_unchanged(now)
-            state.apply(AuthorityEvent.LINK_STALE, now, f'no message for {STALE:g} s')
+            state.apply(AuthorityEvent.LINK_STALE, now, telemetry.link.stale_text(now))
 
     def address_changed(self, now: float) -> None:
         """Await a heartbeat: the messages may come from another vehicle with the same id."""

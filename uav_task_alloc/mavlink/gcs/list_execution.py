@@ -67,7 +67,7 @@ class ListExecution:
         if self._upload_hold.active(now):
             sender.waits_for = 'the end of the service'
             return []
-        if diff.kind is DiffKind.REPLACE and telemetry.airborne and not telemetry.good_link(now):
+        if diff.kind is DiffKind.REPLACE and telemetry.airborne and not telemetry.link.good(now):
             return sender.wait_for('a link without gaps for 10 s')
         if (diff.kind is DiffKind.REPLACE and not self._profile.atomic and telemetry.airborne
                 and telemetry.mode is ModeFunction.MISSION):

@@ -35,7 +35,7 @@ class MessageRates:
     def step(self, now: float) -> list[Message]:
         """The requests that are due."""
         quiet = now - self._telemetry.positions_at > _QUIET
-        if self._received and quiet and not self._telemetry.stale(now):
+        if self._received and quiet and not self._telemetry.link.stale(now):
             self._telemetry.received_ids.clear()
             self.restart(now)
         self._received = self._received or not quiet
@@ -47,7 +47,7 @@ class MessageRates:
         last = self._telemetry.received_last
         silent = {number for number, rate in rates.items()
                   if now - last.get(number, now) > _SILENT + 4.0 / rate}
-        if silent - self._silent and not self._telemetry.stale(now):
+        if silent - self._silent and not self._telemetry.link.stale(now):
             self.restart(now)
         self._silent = silent
         if now < self._due:

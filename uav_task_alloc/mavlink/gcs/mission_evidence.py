@@ -70,7 +70,7 @@ class MissionEvidence:
 
     def may_end(self) -> bool:
         """Whether the last item with a position is being flown, or is passed."""
-        return self._onboard.progress.may_end(self._telemetry.received_at)
+        return self._onboard.progress.may_end(self._telemetry.link.received_at)
 
     def verified(self) -> bool:
         """Whether the list is VERIFIED on board."""

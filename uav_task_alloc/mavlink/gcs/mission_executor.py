@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
-from uav_task_alloc.mavlink.gcs.authority import HoldStage, SendAction
+from uav_task_alloc.mavlink.gcs.authority import OUR_MISSION, HoldStage, SendAction
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
@@ -260,7 +260,7 @@ class MissionExecutor:
 
     def _linked(self, now: float) -> NextMessages:
         """Send nothing while the link is stale."""
-        if self.telemetry.stale(now):
+        if self.telemetry.link.stale(now):
             self._was_stale, self.sender.waits_for = True, 'its link'
             self.sender.drop()
             return []
@@ -292,6 +292,8 @@ class MissionExecutor:
             return self.sender.wait('the pilot to give it back')
         if not self.authority.allows(SendAction.UPLOAD):
             return self.sender.wait_for(f'authority: {self.authority.why}')
+        if self.watch.yields:  # never granted
+            return self.sender.wait_for(OUR_MISSION)
         if self.authority.held or not self.telemetry.airborne:
             return None
         # a pilot flies the onboard mission: do not replace it

@@ -10,10 +10,12 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction
 from uav_task_alloc.mavlink.fence.onboard_fence import FenceState
+from uav_task_alloc.mavlink.gcs.authority import OUR_MISSION
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
+from uav_task_alloc.mavlink.gcs.link_times import STALE
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
-from uav_task_alloc.mavlink.gcs.telemetry import STALE
+from uav_task_alloc.mavlink.gcs.suspension_checks import YIELDS
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.model import Point
 
@@ -111,13 +113,15 @@ def active_task(executor: MissionExecutor) -> str:
 def why_not_available(executor: MissionExecutor, now: float) -> str:
     """Why a UAV is not available for tasks, and what would change that; '': it is available."""
     telemetry, authority = executor.telemetry, executor.authority
-    if telemetry.stale(now):
+    if telemetry.link.stale(now):
         return 'its link is stale'
     if authority.undecided:
         return 'its authority is not known yet'
     if authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED) or authority.landed:
         return (f'authority {authority.state.name}: {authority.why}; given back by '
                 f'{authority.given_back_by}')
+    if executor.watch.yields:  # never granted
+        return f'{YIELDS}; given back by {OUR_MISSION}'
     if mode_of(executor) is UavMode.FAULT:
         return 'it reports a critical state'
     if not telemetry.past_boot:

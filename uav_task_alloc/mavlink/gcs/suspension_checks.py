@@ -7,6 +7,8 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, Suspension
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 
+YIELDS = 'somebody else changed the mission: yield'
+
 
 def check_system_status(state: AuthorityWatchState, now: float) -> None:
     """Apply MAV_STATE: CRITICAL is a failsafe, EMERGENCY and above count as a kill."""
@@ -29,6 +31,6 @@ def check_foreign(state: AuthorityWatchState, yields: bool, now: float) -> None:
     """
     suspended = state.authority.suspended_by(Suspension.FOREIGN)
     if yields and not suspended:
-        state.apply(AuthorityEvent.FOREIGN, now, 'somebody else changed the mission: yield')
+        state.apply(AuthorityEvent.FOREIGN, now, YIELDS)
     elif not yields and suspended:
         state.apply(AuthorityEvent.FOREIGN_OVER, now, 'our mission is on board again')

@@ -38,5 +38,5 @@ class TakeoffGrant:
             self.takeoff = takeoff  # else it is applied after the suspension
         if (takeoff and idle and authority.state is AuthorityState.NONE and not authority.landed
                 and not authority.undecided and telemetry.grounded and telemetry.past_boot
-                and not telemetry.stale(now)):
+                and not telemetry.link.stale(now)):
             state.apply(AuthorityEvent.GRANTED, now, 'takeoff is true')

@@ -11,14 +11,13 @@ from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.autopilots import OFF_GROUND, ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.battery_level import BatteryLevel
 from uav_task_alloc.mavlink.gcs.boot_clock import BootClock
+from uav_task_alloc.mavlink.gcs.link_times import LinkTimes
 from uav_task_alloc.mavlink.gcs.status_texts import failing_checks
 from uav_task_alloc.mavlink.gcs.telemetry_messages import ESTIMATE, STATE_REPORTS
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
 
-STALE, LOST = 3.0, 10.0  # [s] without a message
-_QUIET, _STEADY = 2.0, 10.0  # [s] a link is good with no gap of _QUIET for _STEADY
 _IN_MISSION = 1  # MISSION_CURRENT.mission_mode; 0: not known
 _NOT_FLOWN = {d.MISSION_STATE_NOT_STARTED, d.MISSION_STATE_PAUSED}  # ArduPilot sends the first
 _ORDERED = 5.0  # [s] in which the numbers of two frames order them
@@ -43,7 +42,7 @@ class Telemetry:
 
     def __init__(self, profile: Profile, origin: Origin, now: float) -> None:
         self._profile, self._origin = profile, origin
-        self.received_at = now  # [s] of the latest message
+        self.link = LinkTimes(now)
         self.position, self.velocity = UNKNOWN, UNKNOWN  # ENU [m], [m/s]
         self.home: Point | None = None  # ENU [m]
         self.position_at = self.positions_at = -math.inf  # [s] valid; any GLOBAL_POSITION_INT
@@ -60,7 +59,7 @@ class Telemetry:
         self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
         self.unhealthy = ''  # text on failing prearm checks; '': none reported
         self.current: int | None = None  # seq on the wire
-        self.current_at = self._gap_at = -math.inf  # [s] of it; end of the latest gap of _QUIET
+        self.current_at = -math.inf  # [s] of it
         self.reached: int | None = None  # seq on the wire, latest
         self.total: int | None = None  # number of items as the vehicle reports it
         self.mission_state = self.plan_id = 0  # MISSION_STATE; PX4's id of the onboard mission
@@ -169,18 +168,6 @@ class Telemetry:
         """Whether it reports MAV_STATE_CRITICAL or worse."""
         return bool(self.status >= d.MAV_STATE_CRITICAL)
 
-    def stale(self, now: float) -> bool:
-        """Whether no message was received for STALE."""
-        return now - self.received_at > STALE
-
-    def lost(self, now: float) -> bool:
-        """Whether no message was received for LOST."""
-        return now - self.received_at > LOST
-
-    def good_link(self, now: float) -> bool:
-        """Whether the last 10 s had no gap of more than 2 s."""
-        return now - self.received_at <= _QUIET and now - self._gap_at >= _STEADY
-
     def idle_after(self) -> float:
         """Return the time [s] after which the vehicle has given up a transfer, by its clock.
 
@@ -191,7 +178,7 @@ class Telemetry:
 
     def note_acknowledged(self, mode: ModeFunction) -> None:
         """Take a mode that the vehicle has acknowledged; its heartbeats may be older."""
-        self._set_mode(mode, self.received_at)
+        self._set_mode(mode, self.link.received_at)
         self.arms_into_mission = False
         self._mode_frame = self.frames.newest
 
@@ -210,9 +197,7 @@ class Telemetry:
 
     def receive(self, message: Message, now: float) -> bool:
         """Process a message of this vehicle; False if a newer one of its type was received."""
-        if now - self.received_at > _QUIET:
-            self._gap_at = now
-        self.received_at = now
+        self.link.receive(now)
         boot = getattr(message, 'time_boot_ms', None)
         if boot is not None:  # first, as a restart begins other frame numbers
             booted_at = self._boot_clock.receive(boot, now)
@@ -265,6 +250,7 @@ class Telemetry:
         return True
 
     def _heartbeat(self, message: Message, now: float) -> None:
+        self.link.heartbeat_at = now
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         mode = self._profile.mode_function(message.custom_mode)
         self.arms_into_mission = (

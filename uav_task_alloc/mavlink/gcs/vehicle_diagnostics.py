@@ -79,9 +79,9 @@ def _level_of(session: VehicleSession, now: float) -> tuple[int, str]:
     executor, telemetry = session.executor, session.executor.telemetry
     authority, state = executor.authority, executor.onboard.state
     link = authority.suspended_by(Suspension.LINK)
-    if telemetry.lost(now) or (link and executor.watch.was_lost):
+    if telemetry.link.lost(now) or (link and executor.watch.was_lost):
         return _STALE, 'link lost'
-    if telemetry.stale(now) or link:
+    if telemetry.link.stale(now) or link:
         return _WARN, 'link stale'
     if session.fault:
         return _ERROR, session.fault
@@ -114,7 +114,7 @@ def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
         list_revision=onboard.revision, epoch=onboard.progress.epoch,
         item=f'{onboard.progress.current} of {len(onboard.progress.items)}',
         upload=upload_progress(onboard, now) or 'none', uploads=onboard.upload.uploads,
-        restarts=telemetry.restarts, silent_for=f'{now - telemetry.received_at:.1f} s',
+        restarts=telemetry.restarts, silent_for=f'{now - telemetry.link.received_at:.1f} s',
         clock_rate='unknown' if math.isnan(rate) else f'{rate:.3f}',
         strays=session.strays, held_by=executor.holds.reason or 'nobody',
         fence=executor.fence.text, fence_parameters=executor.fence.parameters.text,

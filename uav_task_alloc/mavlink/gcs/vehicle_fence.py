@@ -146,7 +146,7 @@ class VehicleFence:
         if policy.fences == 'off' and not policy.rally:
             return (self.transfer.cancel() + self.rally.transfer.cancel()
                     + self._read_return_height(now))
-        if self._telemetry.stale(now) or not self._telemetry.past_boot:
+        if self._telemetry.link.stale(now) or not self._telemetry.past_boot:
             return []
         if self._onboard.upload.busy:
             return self.transfer.cancel() + self.rally.transfer.cancel()
@@ -163,7 +163,7 @@ class VehicleFence:
         """Read how high it returns, for `UavState`, also without fences."""
         if self.parameters.is_idle(now, fences=False):
             return []
-        idle = not (self._telemetry.stale(now) or self._onboard.upload.busy)
+        idle = not (self._telemetry.link.stale(now) or self._onboard.upload.busy)
         if not (idle and self._telemetry.past_boot and self._authority.allows(SendAction.READ)):
             return []
         return self.parameters.step(now, fences=False)
@@ -175,7 +175,9 @@ class VehicleFence:
         if not self._authority.allows(SendAction.READ):
             return []
         text = self.rally.text
-        out = self.rally.step(now, self._authority.allows(SendAction.UPLOAD))
+        if not self._may_upload and self.rally.transfer.state is FenceState.UPLOADING:
+            return self.rally.transfer.cancel()
+        out = self.rally.step(now, self._may_upload)
         if self.rally.text != text and not self.rally.transfer.busy:
             self.notes.append(OperatorNote('info', f'rally points {self.rally.text}'))
         return out
@@ -184,16 +186,20 @@ class VehicleFence:
         if not self._authority.allows(SendAction.READ):
             return []
         out = self.parameters.step(now)
-        if self.transfer.busy and not self._authority.allows(SendAction.UPLOAD) and (
-                self.state is FenceState.UPLOADING):
-            return self.transfer.cancel()  # its messages would be dropped
+        if not self._may_upload and self.state is FenceState.UPLOADING:
+            return self.transfer.cancel()
         if self.transfer.busy:
             return out + self.transfer.step(now)
         settled = not self._telemetry.airborne or now - self._changed_at >= _SETTLED or (
             self._blocks())
         return out + self.transfer.begin(
-            now, settled and self._authority.allows(SendAction.UPLOAD)
-            and self._policy().zones_known)
+            now, settled and self._may_upload and self._policy().zones_known)
+
+    @property
+    def _may_upload(self) -> bool:
+        """Whether it may be changed now: not in a flight that the bridge was not granted."""
+        return self._authority.allows(SendAction.UPLOAD) and (
+            self._authority.held or not self._telemetry.airborne)
 
     def clear_way(self, now: float) -> list[Message] | None:
         """A rule: wait where the list passes through a fence on board that is being changed."""
@@ -201,7 +207,7 @@ class VehicleFence:
             return None
         self._choose(now, at_once=True)
         if not self._blocks() or self.transfer.failures >= _MOST_FAILURES or (
-                not self._authority.allows(SendAction.UPLOAD)):
+                not self._may_upload):
             return None
         return []
 

@@ -27,7 +27,7 @@ class BridgeShutdown:
         """
         self.requested_at = now if self.requested_at is None else self.requested_at
         return now - self.requested_at < UPLOAD_TIMEOUT and any(held_for_upload(
-            session for session in fleet if not session.executor.telemetry.lost(now)))
+            session for session in fleet if not session.executor.telemetry.link.lost(now)))
 
     @staticmethod
     def warnings(fleet: Iterable[VehicleSession]) -> list[str]:

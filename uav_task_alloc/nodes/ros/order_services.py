@@ -19,7 +19,12 @@ from uav_task_alloc_msgs import msg as m, srv
 
 from uav_task_alloc.allocator import Allocator
 from uav_task_alloc.allocator.operator_desk import OperatorDesk, OrderTrial
-from uav_task_alloc.allocator.order_requests import OrderAction, OrderAnswer, OrderRequest
+from uav_task_alloc.allocator.order_requests import (
+    OrderAction,
+    OrderAnswer,
+    OrderRequest,
+    refused,
+)
 from uav_task_alloc.allocator.records import Outbox
 from uav_task_alloc.allocator.replanning.what_if import WhatIfAnswer, solve_what_if
 from uav_task_alloc.errors import InvalidValue
@@ -44,6 +49,8 @@ _SERVICES: dict[str, tuple[Any, OrderAction]] = {
     'resume_uav': (srv.ResumeUav, OrderAction.RESUME),
     'return_uav': (srv.ReturnUav, OrderAction.RETURN),
     'undo_order': (srv.UndoOrder, OrderAction.UNDO)}
+# what takes effect by lists only
+_NEEDS_LISTS = {OrderAction.PIN, OrderAction.FORBID, OrderAction.ORDER, OrderAction.RETURN}
 
 
 class OrderServices:
@@ -54,11 +61,13 @@ class OrderServices:
         core: whose world orders change.
         save: writes the world to disk; called before each response.
         stamp: the published clock [s].
+        conflict: returns why no lists are published; '': they are.
     """
 
     def __init__(self, node: Node, core: Allocator, save: Callable[[], None],
-                 stamp: Callable[[], float]) -> None:
+                 stamp: Callable[[], float], conflict: Callable[[], str]) -> None:
         self._node, self._world, self._save, self._stamp = node, core.world, save, stamp
+        self._conflict = conflict
         self._desk = OperatorDesk(core)
         self._proposals = node.create_publisher(m.PlanProposal, 'plan_proposal', LATCHED)
         self._alerts = node.create_publisher(m.SeparationAlert, 'separation_alerts', EVENTS)
@@ -127,8 +136,10 @@ class OrderServices:
 
     def _on_approve(self, msg: srv.ApprovePlan.Request,
                     response: srv.ApprovePlan.Response) -> srv.ApprovePlan.Response:
-        answer = self._desk.approve(msg.revision, msg.accept, to_operator(msg), msg.dry_run,
-                                    time.monotonic(), self._stamp())
+        conflict = self._conflict()
+        answer = refused(f'nothing is planned: {conflict}') if conflict else self._desk.approve(
+            msg.revision, msg.accept, to_operator(msg), msg.dry_run, time.monotonic(),
+            self._stamp())
         self._save()
         return from_order_answer(answer, response)
 
@@ -139,7 +150,9 @@ class OrderServices:
             except InvalidValue as error:
                 answer = OrderAnswer(False, f'refused: {error}')
             else:
-                answer = await self._decided(request)
+                conflict = self._conflict() if action in _NEEDS_LISTS else ''
+                answer = (refused(f'nothing is planned: {conflict}') if conflict
+                          else await self._decided(request))
             if not answer.success:
                 self._node.get_logger().warning(
                     f'{to_operator(msg)}: {action.value} {answer.message}')
