@@ -15,6 +15,8 @@ import pytest
 from numba.core.codegen import JITCodeLibrary
 
 import uav_task_alloc
+from uav_task_alloc import kernel_cache
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.kernel_cache import CompilationNotice, KernelWork, kernel_sources, sources_hash
 from uav_task_alloc.kernel_inner import replaces_known_methods
 
@@ -99,6 +101,13 @@ def test_without_a_private_class_of_numba_kernels_are_compiled_as_numba_does(
         printed, errors = start(package, hide + CALL).communicate(timeout=180.0)
         assert printed.endswith(' False\n2.0\n')
         assert 'at each start: the cache of this numba is not known' in errors
+
+
+def test_without_a_folder_that_can_be_written_the_variable_for_one_is_named(monkeypatch):
+    bases = [type('Base', (), {'from_function': staticmethod(lambda *_: None)})]
+    monkeypatch.setattr(kernel_cache, '_BASES', bases)
+    with pytest.raises(InvalidValue, match=r'NUMBA_CACHE_DIR = .*: expected a folder'):
+        kernel_cache.KernelCacheLocator.from_function(kernel_cache.kernel_folders, 'x.py')
 
 
 def test_methods_with_other_arguments_are_not_replaced():

@@ -54,6 +54,24 @@ def first_of(texts: Iterable[str], most: int = 5, separator: str = ', ', kind: s
     return separator.join(listed[:most]) + (f' and {more} more{kind}' if more > 0 else '')
 
 
+def damage(error: Exception) -> str:
+    """Why a document that others wrote cannot be read, for an error text.
+
+    Args:
+        error: raised where a value was taken from it.
+
+    Returns:
+        One line; of an error of any other kind its name and text.
+    """
+    if isinstance(error, KeyError):
+        return f'{shown(error.args[0] if error.args else "")} is missing'
+    if isinstance(error, IndexError):
+        return 'a list is too short'
+    if isinstance(error, (TypeError, AttributeError)):
+        return f'a value is of another kind ({error})'
+    return f'{type(error).__name__}: {error}'
+
+
 class UnknownName(AllocError, KeyError):
     """A name of a solver, UAV, task or parameter that is not declared.
 

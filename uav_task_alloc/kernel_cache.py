@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
+import os
 import re
 import shutil
 import signal
@@ -21,6 +22,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
 from numba.core import caching, event
+
+from uav_task_alloc.errors import InvalidValue
 
 _COMPILER_SOURCES = ('kernel.py', 'kernel_arguments.py', 'kernel_inner.py', 'kernel_shortcuts.py',
                      'model/zone.py')
@@ -105,14 +108,20 @@ class KernelCacheLocator(_CacheLocator):  # type: ignore[misc]
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> KernelCacheLocator | None:
-        """The locator of a function; None for functions of other packages, and if not ON_DISK."""
+        """The locator of a function; None for functions of other packages, and if not ON_DISK.
+
+        Raises:
+            InvalidValue: no folder can be written.
+        """
         if not (ON_DISK and py_func.__module__.startswith(f'{__package__}.')):
             return None
         for base in _BASES:
             locator = base.from_function(py_func, py_file)
             if locator is not None:
                 return cls(py_file, locator.get_cache_path())
-        return None
+        raise InvalidValue('NUMBA_CACHE_DIR', os.environ.get('NUMBA_CACHE_DIR', ''),
+                           'a folder for compiled kernels, as neither the folder of the package '
+                           'nor that of the user can be written')
 
     def get_cache_path(self) -> str:
         """The folder; it need not exist."""

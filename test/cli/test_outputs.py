@@ -45,6 +45,12 @@ BENCH = ['bench', '--sizes', '1x1', '--against', 'none']
     ([*BENCH, '--json', 'none/x'], "--json = 'none/x': expected a file in a folder that exists"),
     ([*BENCH, '--plot', 'x.txt'], "--plot = 'x.txt': expected a name that ends with .png or"),
     ([*BENCH, '--keep', FILE], f"--keep = '{FILE}': expected a place that can be written"),
+    (['plan', FILE, '--plot', 'g.png', '--plot-times', './g.png'],
+     "--plot-times = 'g.png': expected another file than the command uses otherwise"),
+    (['plan', FILE, '--terrain-clearance', '50'],
+     '--terrain-clearance = 50.0: expected --terrain with the ground, too'),
+    (['import', '.'], "FILE = '.': expected a file, and this is a folder"),
+    (['import', 'a.csv', '--fleet', FILE, '--uavs', '4'], '--uavs = 4: expected either it or'),
     (['study', '--out', FILE], f"--out = '{FILE}': expected a place that can be written"),
 ])
 def test_an_output_that_cannot_be_written_is_refused_first(

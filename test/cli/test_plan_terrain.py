@@ -9,7 +9,12 @@ import pytest
 
 from uav_task_alloc import plan
 from uav_task_alloc.cli.plan_pieces import with_pieces
-from uav_task_alloc.cli.plan_terrain import check_ground, over_terrain, plan_over_terrain
+from uav_task_alloc.cli.plan_terrain import (
+    check_ground,
+    ground_of,
+    over_terrain,
+    plan_over_terrain,
+)
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model.route_stops import route_points
@@ -147,3 +152,7 @@ def test_heights_above_a_ground_that_is_not_known_are_refused():
     work = Work(parse(SCENARIO).tasks[0].task, Kind.POINT, vertical=Vertical.TERRAIN)
     with pytest.raises(InvalidValue, match=r"vertical = 'TERRAIN': expected ORIGIN: no terrain"):
         pieces_of(work)
+    loaded = parse(SCENARIO)
+    assert any(timed.whole.vertical is Vertical.TERRAIN for timed in loaded.tasks)
+    with pytest.raises(InvalidValue, match=r"vertical = 'terrain': expected --terrain with"):
+        ground_of(loaded, None, None)

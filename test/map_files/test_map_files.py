@@ -286,7 +286,20 @@ BROKEN = {
     'list.plan': ('[1]', 'expected a .plan file of QGroundControl'),
     'other.plan': ('{"fileType": "Map"}', "fileType = 'Map': expected Plan"),
     'short.plan': (plan_text([{'type': 'SimpleItem', 'command': 16, 'params': [0]}]),
-                   'IndexError'),
+                   'short.plan: a list is too short: expected a .plan file'),
+    'key.plan': ('{"fileType": "Plan"}', "key.plan: 'mission' is missing: expected a .plan file"),
+    'kind.plan': ('{"fileType": "Plan", "mission": {"items": 7}}',
+                  'kind.plan: a value is of another kind'),
+    'line.csv': ('lat,lon,kind\n47.4,8.547,line\n',
+                 "line.csv:2: kind = 'line' of a point: expected a line"),
+    'area.geojson': (geojson((point(8.547, 47.4), {'kind': 'Area'})),
+                     "feature 1: kind = 'area' of a point: expected a polygon"),
+    'twice.csv': ('lat,lon,lat\n47.4,8.547,47.5\n',
+                  'twice.csv:1: two columns lat: expected each name once'),
+    'heights.csv': ('lat,lon,altitude,altitude_amsl\n47.4,8.547,50,500\n',
+                    'columns altitude and altitude_amsl: expected one of them'),
+    'heights.geojson': (geojson((point(8.547, 47.4), {'altitude': 50, 'altitude_amsl': 500})),
+                        'feature 1: altitude and altitude_amsl: expected one of them'),
     'mode.plan': (plan_text([simple(16, 47.4, 8.5, 30, mode=9)]),
                   'item 1: AltitudeMode 9, frame 3: expected an altitude relative to launch'),
     'empty.csv': ('', "columns '': expected one named latitude"),
@@ -306,6 +319,17 @@ def test_a_broken_file_is_refused_with_file_element_and_reason(tmp_path, name):
     assert reason in str(refused.value)
     assert name in str(refused.value) or 'nothing to import' in reason
     assert '\n' not in str(refused.value)
+
+
+def test_a_kind_is_read_without_regard_to_case(tmp_path):
+    read, _ = imported(tmp_path, 'a.csv', 'lat,lon,kind,radius\n47.4,8.547,Orbit,30\n')
+    assert [(task.task.id, task.work.kind.name, task.work.radius) for task in read.tasks] == [
+        ('task', 'ORBIT', 30.0)]
+
+
+def test_rows_without_any_value_are_ignored(tmp_path):
+    read, _ = imported(tmp_path, 'a.csv', 'lat,lon,name\n47.4,8.547,m\n,,\n , ,\n')
+    assert [task.task.id for task in read.tasks] == ['m']
 
 
 def test_without_an_origin_the_file_is_refused(tmp_path):

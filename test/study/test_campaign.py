@@ -148,3 +148,13 @@ def test_a_killed_cluster_worker_loses_no_result(tmp_path, cluster):
 def test_fewer_than_one_process_is_refused():
     with pytest.raises(InvalidValue, match=r'--jobs = 0: expected an integer in \[1, inf\)'):
         executors.chosen(argparse.Namespace(dask=None, jobs=0))
+
+
+@pytest.mark.parametrize(('address', 'expected'), [
+    ('nonsense', 'tcp://HOST:PORT'), ('tcp://127.0.0.1:1', 'a Dask scheduler that answers')])
+def test_a_dask_scheduler_that_is_not_there_is_refused(address, expected, monkeypatch):
+    pytest.importorskip('distributed')
+    monkeypatch.setattr(executors, '_CONNECT_TIMEOUT', 0.5)
+    with pytest.raises(InvalidValue, match=f"--dask = '{address}': expected {expected}"), (
+            executors.dask(address)):
+        pass

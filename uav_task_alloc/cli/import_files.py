@@ -34,13 +34,18 @@ def main(argv: Sequence[str]) -> int:
             written.
     """
     args = _make_parser().parsed(argv)
+    for path in args.files:
+        if path.is_dir():
+            raise InvalidValue('FILE', str(path), 'a file, and this is a folder')
+    if args.fleet and args.uavs is not None:
+        raise InvalidValue('--uavs', args.uavs, 'either it or --fleet, whose UAVs are taken')
     out = args.output or args.files[0].with_suffix('.yaml')
     if out.exists():
         raise InvalidValue('--output', str(out), 'a file that does not exist yet')
     check_file('--output', out, _SUFFIXES, [*args.files, *([args.fleet] if args.fleet else [])])
     made = to_scenario([read_map_file(path) for path in args.files], ImportChoices(
         args.origin, args.height, args.altitudes or '', args.polygons == 'zones',
-        args.lines == 'vertices', args.strip_width or 0.0, args.uavs, _fleet(args.fleet)),
+        args.lines == 'vertices', args.strip_width or 0.0, args.uavs or 1, _fleet(args.fleet)),
         out.stem)
     with naming('--output', out):
         replace_file(out, made.text)
@@ -73,8 +78,8 @@ def _make_parser() -> OptionParser:
     parser.add_argument('--fleet', type=Path, metavar='SCENARIO.yaml',
                         help='a scenario with UAVs, to which tasks and zones are added (default: '
                              'none)')
-    parser.number('--uavs', 1, 250, 'at the origin, where there is no fleet', default=1,
-                  whole=True)
+    parser.number('--uavs', 1, 250, 'at the origin, where there is no fleet',
+                  default_text='1', whole=True)
     parser.number('--height', -1000.0, 10000.0, 'of tasks whose file has no altitude, above the '
                   'origin', unit='m', default=50.0)
     parser.add_argument('--altitudes', type=one_of('amsl', 'origin', 'ignore'),

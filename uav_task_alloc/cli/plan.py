@@ -25,7 +25,7 @@ from uav_task_alloc.cli.outputs import (
 )
 from uav_task_alloc.cli.plan_json import plan_json
 from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
-from uav_task_alloc.cli.plan_terrain import check_ground, plan_over_terrain
+from uav_task_alloc.cli.plan_terrain import CLEARANCE, check_ground, ground_of, plan_over_terrain
 from uav_task_alloc.cli.plan_times import has_times, times_text
 from uav_task_alloc.cli.progress import SolveProgress, log_line
 from uav_task_alloc.errors import InvalidValue, UnknownName, first_of
@@ -33,7 +33,6 @@ from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.values import Scenario
-from uav_task_alloc.terrain import read_terrain
 
 _ITS_OWN = "the scenario's"  # default of an option
 
@@ -51,9 +50,9 @@ def main(argv: Sequence[str]) -> int:
     check_outputs(args)
     _check_solver(args.solver)
     given = with_options(without_cancelled(scenario.load(args.scenario)), args)
-    terrain = read_terrain(args.terrain, given.origin) if args.terrain else None
+    terrain, clearance = ground_of(given, args.terrain, args.terrain_clearance)
     loaded = with_pieces(given, terrain)
-    ground = check_ground(loaded, terrain, args.terrain_clearance) if terrain else []
+    ground = check_ground(loaded, terrain, clearance) if terrain else []
     with counted_kernels():
         _load_kernels(loaded, args.solver, search=False)
         for text in start_warnings(loaded) + ground:
@@ -65,7 +64,7 @@ def main(argv: Sequence[str]) -> int:
             first = early.wait()
             result = first or solve_scenario(loaded, args, progress.stop, progress.on_iteration)
     if terrain:
-        result = plan_over_terrain(loaded, result, terrain, args.terrain_clearance,
+        result = plan_over_terrain(loaded, result, terrain, clearance,
                                    lambda rest: solve_scenario(rest, args, progress.stop))
     with early.ending(INTERRUPTED):
         _answer(loaded, result, args)
@@ -143,7 +142,8 @@ def _make_parser() -> OptionParser:
                         help='a GeoTIFF of ground heights (AMSL): legs keep clear of the ground, '
                              'and tasks may have vertical: terrain (default: none)')
     parser.number('--terrain-clearance', 0.0, 10000.0, 'that legs keep from the ground of '
-                  '--terrain; tasks that are lower are reached upright', unit='m', default=30.0)
+                  '--terrain; tasks that are lower are reached upright', unit='m',
+                  default_text=f'{CLEARANCE:g}')
     _add_outputs(parser)
     return parser
 
@@ -175,7 +175,7 @@ def check_outputs(args: argparse.Namespace) -> None:
         if path is not None and suffixes is FIGURE_SUFFIXES:
             check_installed(option, 'matplotlib')
         check_file(option, path, suffixes, used)
-        used += [path] if path and path.is_file() else []
+        used += [path] if path and (path.is_file() or not path.exists()) else []
     if args.missions:
         check_installed('--missions', 'pymavlink')
         check_folder('--missions', args.missions)

@@ -6,16 +6,43 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Leg, Plan, Point
 from uav_task_alloc.model.route_stops import route_stops
 from uav_task_alloc.scenario.values import Scenario, TimedTask
-from uav_task_alloc.terrain import Terrain, check_above
+from uav_task_alloc.terrain import Terrain, check_above, read_terrain
 from uav_task_alloc.terrain_legs import TerrainLegs
+from uav_task_alloc.work.values import Vertical
 
+CLEARANCE = 30.0  # [m] that legs keep from the ground, where it is not given
 _SUNK = 5.0  # [m] below the ground: more is no inaccuracy of the raster
+
+
+def ground_of(given: Scenario, path: Path | None,
+                clearance: float | None) -> tuple[Terrain | None, float]:
+    """The ground that options name, and the clearance from it [m].
+
+    Args:
+        given: the scenario.
+        path: of a GeoTIFF; None: no ground is known.
+        clearance: [m]; None: `CLEARANCE`.
+
+    Raises:
+        InvalidValue: a clearance without a ground, or a task above a ground that is not known.
+        TerrainError: the file cannot be read.
+    """
+    if path is not None:
+        return read_terrain(path, given.origin), CLEARANCE if clearance is None else clearance
+    if clearance is not None:
+        raise InvalidValue('--terrain-clearance', clearance, '--terrain with the ground, too')
+    for timed in given.tasks:
+        if timed.whole.vertical is Vertical.TERRAIN:
+            raise InvalidValue(f'task {timed.task.id}: vertical', 'terrain',
+                               '--terrain with the ground that it is above')
+    return None, CLEARANCE
 
 
 def check_ground(loaded: Scenario, terrain: Terrain, clearance: float) -> list[str]:

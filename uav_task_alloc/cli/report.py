@@ -14,7 +14,7 @@ import numpy as np
 from uav_task_alloc.cli.options import OptionParser
 from uav_task_alloc.cli.outputs import MAP_SUFFIXES, check_file, check_installed, naming
 from uav_task_alloc.cli.progress import log_line
-from uav_task_alloc.errors import AllocError, InvalidValue
+from uav_task_alloc.errors import AllocError, InvalidValue, damage
 from uav_task_alloc.map_files.write import flight_shapes, write_map
 from uav_task_alloc.record.ground_truth import (
     GroundTruth,
@@ -259,7 +259,7 @@ def demo_table(place: Path, flown: Path | None) -> int:
         if isinstance(error, AllocError):
             raise
         raise InvalidValue('report', str(place), 'a recorded run, undamaged: '
-                           f'{type(error).__name__}: {error}') from None
+                           f'{damage(error)}') from None
     print(f'Map: {png}')
     return 0
 

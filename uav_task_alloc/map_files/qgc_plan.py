@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from uav_task_alloc.errors import AllocError, shown
+from uav_task_alloc.errors import AllocError, damage, shown
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.map_files.elements import (
     ABOVE_ORIGIN,
@@ -56,7 +56,7 @@ def read_plan(document: Any, file: str) -> MapFile:
     except (AttributeError, LookupError, TypeError, ValueError, OverflowError) as error:
         if isinstance(error, AllocError):
             raise
-        raise MapFileError(f'{file}: {type(error).__name__}: {error}: expected a .plan file of '
+        raise MapFileError(f'{file}: {damage(error)}: expected a .plan file of '
                            'QGroundControl') from None
     return read
 

@@ -39,6 +39,7 @@ _LISTS = 'required_capabilities', 'allowed_uavs', 'capabilities'
 _NESTED = 'actions', 'camera'  # JSON values, or texts of them
 _KINDS = {'task': 'tasks', 'zone': 'zones', 'no_fly_zone': 'zones', 'uav': 'uavs',
           **dict.fromkeys(_WORK_KEYS, 'tasks')}
+_GEOMETRIES = {'point': 'point', 'orbit': 'point', 'line': 'line', 'area': 'polygon'}
 _HINTED = {'value', 'service_time', 'latest'}  # keys for which a hint names other words
 _RESULTS = 'route', 'track'  # written by map_files.write
 _ROW = re.compile(r':\d+: (scenario\.(tasks|zones|uavs)\[(\d+)\].*)', re.DOTALL)
@@ -183,7 +184,7 @@ class _Rows:
                                'UAV')
 
     def _as_vertices(self, element: Element) -> bool:
-        return self.choices.vertices and element.properties.get('kind') != 'line'
+        return self.choices.vertices and _given_kind(element) != 'line'
 
     def _strips(self, element: Element) -> dict[str, Any]:
         """What says how wide the strips of an area are; nothing where it is not known."""
@@ -216,18 +217,21 @@ class _Rows:
                                       for text in self._renamed[:1]]
 
     def _kind(self, element: Element) -> str:
-        given = str(element.properties.get('kind', '')).strip().lower().replace('-', '_')
+        given = _given_kind(element)
         if given in _RESULTS:
             return ''
         if given and given not in _KINDS:
             raise MapFileError(f'{element.where}: kind = {given!r}: expected one of '
                                f'{", ".join(_KINDS)}')
+        if _GEOMETRIES.get(given, element.geometry) != element.geometry:
+            raise MapFileError(f'{element.where}: kind = {given!r} of a {element.geometry}: '
+                               f'expected a {_GEOMETRIES[given]}')
         zone = element.zone or (element.geometry == 'polygon' and self.choices.all_zones)
         return _KINDS[given] if given else 'zones' if zone else 'tasks'
 
     def _add_point(self, kind: str, element: Element, place: Place, name: str,
                    without: float) -> None:
-        orbit = {'kind': 'orbit'} if element.properties.get('kind') == 'orbit' else {}
+        orbit = {'kind': 'orbit'} if _given_kind(element) == 'orbit' else {}
         self._append(kind, element, name, {
             **orbit, 'latitude': place.latitude, 'longitude': place.longitude,
             'altitude': self._altitude(element, place, without)})
@@ -236,6 +240,8 @@ class _Rows:
         """Height [m] above the origin."""
         own = {key: element.properties[key] for key in ('altitude', 'altitude_amsl')
                if str(element.properties.get(key, '')).strip()}
+        if len(own) > 1:
+            raise MapFileError(f'{element.where}: {" and ".join(own)}: expected one of them')
         if own:
             key, given = next(iter(own.items()))
             number = _number(given)
@@ -300,6 +306,11 @@ class _Rows:
         if name and identifier != name:
             self._renamed.append(f'{element.where}: its id is {identifier}')
         return identifier
+
+
+def _given_kind(element: Element) -> str:
+    """What the property `kind` says; '' for none."""
+    return str(element.properties.get('kind', '')).strip().lower().replace('-', '_')
 
 
 def _value(key: str, value: Any) -> Any:

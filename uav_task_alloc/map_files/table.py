@@ -46,8 +46,13 @@ def read_table(text: str, file: str) -> MapFile:
 def _read_rows(reader: csv.DictReader[str], file: str) -> MapFile:
     names = [str(name).strip().lower() for name in reader.fieldnames or ()]
     reader.fieldnames = names
+    twice = next((name for name in names if name and names.count(name) > 1), '')
+    if twice:
+        raise MapFileError(f'{file}:1: two columns {twice}: expected each name once')
     latitude, longitude = (_column(names, wanted, file) for wanted in (_LATITUDE, _LONGITUDE))
     altitude = next((name for name in names if _quantity(name) in _ALTITUDES), '')
+    if {'altitude', 'altitude_amsl'} <= set(map(_quantity, names)):
+        raise MapFileError(f'{file}:1: columns altitude and altitude_amsl: expected one of them')
     odd = next((name for name in names if not altitude
                 and re.split(r'[(\[]', name)[0].strip() in _ALTITUDES), '')
     if odd:
@@ -59,6 +64,8 @@ def _read_rows(reader: csv.DictReader[str], file: str) -> MapFile:
         where = f'{file}:{reader.line_num}'
         if None in row or None in row.values():
             raise MapFileError(f'{where}: expected {len(names)} columns: {", ".join(names)}')
+        if not any(value.strip() for value in row.values()):
+            continue  # as spreadsheets write below their last row
         mode = _mode(row.get(_MODE), where)
         numbers = [row[longitude], row[latitude]] + (
             [row[altitude]] if altitude and row[altitude].strip() else [])

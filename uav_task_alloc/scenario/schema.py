@@ -24,7 +24,7 @@ from uav_task_alloc.scenario.checked_yaml import (
     whole_number,
 )
 from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP
-from uav_task_alloc.scenario.work_schema import ACTION, CAMERA, WORK_KEYS
+from uav_task_alloc.scenario.work_schema import ACTION, CAMERA, COORDINATE, WORK_KEYS
 
 _TIME = number_value(0.0)
 _LENGTH = number_value(0.0, infinite=True)
@@ -32,8 +32,8 @@ _SPEED = number_value(0.0, open_low=True, infinite=True)
 _PRICE = number_value(0.0, 1e9)
 _SHORTEST = Objective()
 POSITIVE = number_value(0.0, open_low=True)
-POINT = list_of(number_value(), 'three numbers [x, y, z]', 3, 3)
-CORNER = list_of(number_value(), 'two numbers [x, y]', 2, 2)
+POINT = list_of(COORDINATE, 'three numbers [x, y, z]', 3, 3)
+CORNER = list_of(COORDINATE, 'two numbers [x, y]', 2, 2)
 NAME = text_value('a non-empty string')
 ID = text_value('letters, digits, _ and / after a letter or _', is_ros_name)
 ROS_NAME = text_value('letters, digits and _ after a letter, as it names topics',
@@ -48,7 +48,7 @@ ORIGIN: KeyTable = {
 
 _LATITUDE, _LONGITUDE = (Key(number_value(-90.0, 90.0), '[deg] WGS84', None),
                          Key(number_value(-180.0, 180.0), '[deg] WGS84', None))
-_ALTITUDE = Key(number_value(), '[m] above the origin', None)
+_ALTITUDE = Key(COORDINATE, '[m] above the origin', None)
 GEODETIC: KeyTable = {
     'latitude': replace(_LATITUDE, default=REQUIRED),
     'longitude': replace(_LONGITUDE, default=REQUIRED),
@@ -140,7 +140,7 @@ OBJECTIVE: KeyTable = {
 ZONE: KeyTable = {
     'id': Key(ID, 'name of the zone'),
     'shape': Key(choice('hemisphere', 'cylinder', 'polygon'), 'its shape'),
-    'center': Key(list_of(number_value(), 'three numbers [x, y, z] (cylinder: [x, y] suffices)',
+    'center': Key(list_of(COORDINATE, 'three numbers [x, y, z] (cylinder: [x, y] suffices)',
                           2, 3),
                   '[m] ENU; hemisphere and cylinder; either this or latitude and longitude, of a '
                   'hemisphere also altitude', None),

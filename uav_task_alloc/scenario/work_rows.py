@@ -10,11 +10,11 @@ from uav_task_alloc.actions import Action
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point, Task
 from uav_task_alloc.scenario.checked_yaml import YamlRow
+from uav_task_alloc.scenario.work_schema import FARTHEST
 from uav_task_alloc.work.footprint import Camera, Footprint, footprint
 from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.work.values import Kind, Vertical
 
-_FARTHEST = 500e3  # [m] from the origin: farther out, degrees or origin are wrong
 _MILLIMETRES = 'sensor_width', 'sensor_height', 'focal_length'
 
 
@@ -35,8 +35,8 @@ def from_degrees(row: YamlRow, origin: Origin, altitude: float | None = None,
     own = row.values.get('altitude')
     above = (altitude or 0.0) if own is None else own
     point = to_enu(origin, row['latitude'], row['longitude'], origin.altitude_amsl + above)
-    if not math.hypot(*point) <= _FARTHEST:
-        raise row.refuse('latitude', f'a place within {_FARTHEST / 1e3:g} km of the origin, '
+    if not math.hypot(*point) <= FARTHEST:
+        raise row.refuse('latitude', f'a place within {FARTHEST / 1e3:g} km of the origin, '
                                      f'{origin.latitude:g}, {origin.longitude:g}')
     return (point[0], point[1], above) if above_ground else point
 

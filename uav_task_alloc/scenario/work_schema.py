@@ -18,11 +18,11 @@ from uav_task_alloc.scenario.checked_yaml import (
     whole_number,
 )
 from uav_task_alloc.work.footprint import FRONT_OVERLAP, SIDE_OVERLAP
-from uav_task_alloc.work.values import Kind, Vertical
+from uav_task_alloc.work.values import ORBIT_RADII, Kind, Vertical
 
+FARTHEST = 500e3  # [m] from the origin: farther out, degrees, origin or frame are wrong
 _ANGLE = number_value(-2 * math.pi, 2 * math.pi)
 _SHARE = number_value(0.0, 0.95)
-_FREE = Key(number_value(), '[m]', None)
 _LATITUDE = Key(number_value(-90.0, 90.0), '[deg] WGS84')
 _LONGITUDE = Key(number_value(-180.0, 180.0), '[deg] WGS84')
 
@@ -33,13 +33,22 @@ def _truth(text: str) -> bool:
     return text.lower() in ('true', 'yes')
 
 
+def _metres(text: str) -> float:
+    value = float(text)
+    if not abs(value) <= FARTHEST:
+        raise ValueError
+    return value
+
+
+COORDINATE = scalar(f'a number of metres within {FARTHEST / 1e3:g} km of the origin', _metres)
+_FREE = Key(COORDINATE, '[m]', None)
 _VERTEX: KeyTable = {
     'latitude': _LATITUDE,
     'longitude': _LONGITUDE,
-    'altitude': Key(number_value(), "[m] above the origin; default: the task's", None),
+    'altitude': Key(COORDINATE, "[m] above the origin; default: the task's", None),
 }
 _POINTS = list_of(or_mapping(
-    list_of(number_value(), 'two or three numbers [x, y, z]', 2, 3), _VERTEX,
+    list_of(COORDINATE, 'two or three numbers [x, y, z]', 2, 3), _VERTEX,
     'numbers [x, y] or [x, y, z], or a mapping with latitude, longitude'),
     'a list of points [x, y, z], [x, y] or {latitude, longitude, altitude}', 1, 1001)
 
@@ -93,7 +102,8 @@ WORK_KEYS: KeyTable = {
                   'their width, and photos on the way their distance', None),
     'direction': Key(_ANGLE, '[rad] of the strips of an area, or from the centre to the entry of '
                      'an orbit, counter-clockwise from east; default: the best, or 0', None),
-    'radius': Key(number_value(0.0, 1e5), '[m] of an orbit', 0.0),
+    'radius': Key(number_value(0.0, ORBIT_RADII[1]), f'[m] of an orbit, at least '
+                  f'{ORBIT_RADII[0]:g}', 0.0),
     'turns': Key(number_value(-100.0, 100.0), 'of an orbit, clockwise; negative: '
                  'counter-clockwise; default: 1', 0.0),
     'divisible': Key(scalar('true or false', _truth), 'whether a line may be cut at its points, '

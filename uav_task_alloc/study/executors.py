@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import re
 import signal
 import threading
 from collections.abc import Iterator
@@ -52,15 +53,21 @@ def dask(address: str) -> Iterator[Executor]:
     """An executor on the workers of a Dask scheduler; jobs of dead workers are moved to others.
 
     Raises:
-        InvalidValue: dask.distributed is not installed.
-        OSError: no scheduler answers at the address.
+        InvalidValue: dask.distributed is not installed, or no scheduler answers at the address.
     """
     try:
         distributed = import_module('distributed')
     except ModuleNotFoundError as error:
         raise InvalidValue('--dask', address, f"dask.distributed to be installed ({error}); "
                            "pip install '.[study]'") from None
-    with distributed.Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False) as client:
+    if not re.fullmatch(r'([a-z]+://)?\S+:\d+', address):
+        raise InvalidValue('--dask', address, 'tcp://HOST:PORT')
+    try:
+        client = distributed.Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)
+    except OSError as error:
+        raise InvalidValue('--dask', address, 'a Dask scheduler that answers, as '
+                           f'tcp://HOST:PORT ({error})') from None
+    with client:
         yield client.get_executor(pure=False)
 
 

@@ -11,10 +11,9 @@ from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.work.line import free_ways
-from uav_task_alloc.work.values import MOST_CORNERS, Geometry, refuse_unused
+from uav_task_alloc.work.values import MOST_CORNERS, ORBIT_RADII, Geometry, refuse_unused
 
 _USED = 'direction', 'radius', 'turns'
-_SMALLEST, _MOST = 1.0, 5000.0  # [m] radius
 _SIDE = 10.0  # [m] of the polygon, where it has not too few or too many corners
 _CORNERS = 16, 48  # fewest, most; of 16 a side is 2 % of the radius nearer to the centre
 
@@ -26,7 +25,7 @@ def check_orbit(given: Geometry) -> None:
         InvalidValue: a value is out of range, or there would be too many corners.
     """
     refuse_unused(given, _USED)
-    check_number(given.place('radius'), given.radius, _SMALLEST, _MOST)
+    check_number(given.place('radius'), given.radius, *ORBIT_RADII)
     if given.turns == 0.0:
         object.__setattr__(given, 'turns', 1.0)
     corners = abs(given.turns) * orbit_corners(given.radius)

@@ -16,6 +16,7 @@ from uav_task_alloc.piece_ids import piece_id
 MOST_PIECES = 1000  # of one task
 MOST_CORNERS = 1000  # of a path or of one hole
 MOST_HOLES = 100
+ORBIT_RADII = 1.0, 5000.0  # [m] smallest, largest
 _SHORTEST = 0.01  # [m] between two points of a path
 _GEOMETRY = 'path', 'holes', 'strip_width', 'direction', 'radius', 'turns'
 
