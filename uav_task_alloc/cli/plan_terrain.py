@@ -22,7 +22,7 @@ _SUNK = 5.0  # [m] below the ground: more is no inaccuracy of the raster
 
 
 def ground_of(given: Scenario, path: Path | None,
-                clearance: float | None) -> tuple[Terrain | None, float]:
+              clearance: float | None) -> tuple[Terrain | None, float]:
     """The ground that options name, and the clearance from it [m].
 
     Args:
