@@ -211,6 +211,30 @@ def test_another_mode_from_a_new_address_is_a_loss(kind, mode):
 
 
 @BOTH
+@pytest.mark.parametrize('what', ['place', 'clock', 'silence'])
+def test_another_vehicle_in_flight_at_the_new_address_is_a_loss(kind, what):
+    bench = flying(kind)
+    cut_link(bench)
+    bench.move_address()
+
+    def of_another(direction, m, now):
+        if direction == 'down' and m.get_type() == 'GLOBAL_POSITION_INT':
+            if what == 'silence':
+                return []
+            m.lat += 50000 * (what == 'place')  # 556 m
+        if direction == 'down' and what == 'clock' and hasattr(m, 'time_boot_ms'):
+            m.time_boot_ms += 600_000
+        return None
+
+    bench.line.tampers.append(of_another)
+    start = len(bench.sent)
+    restore_link(bench, 6.0)
+    assert status_is(bench, L, 'the vehicle at its new address is another one')
+    assert bench.commands(start) == []
+    assert sends_no_command(bench)
+
+
+@BOTH
 @pytest.mark.parametrize('state', [S, L, N])
 def test_a_new_address_of_a_vehicle_that_is_not_held_changes_nothing(kind, state):
     bench = in_flight(kind, state)

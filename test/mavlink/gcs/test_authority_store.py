@@ -13,7 +13,12 @@ from dataclasses import fields, replace
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState, TaskMark
+from uav_task_alloc.mavlink.gcs.authority_state import (
+    UNUSABLE,
+    AuthorityRecord,
+    AuthorityState,
+    TaskMark,
+)
 from uav_task_alloc.mavlink.gcs.authority_store import (
     LONG_AGO,
     AuthorityFileStore,
@@ -133,7 +138,7 @@ def full_disk(*_):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def test_a_full_disk_is_reported_once_and_leaves_no_outdated_file(
+def test_a_full_disk_is_reported_once_and_leaves_an_empty_file(
         store, reports, monkeypatch):
     store.save('uav_1', FULL)
     monkeypatch.setattr(os, 'replace', full_disk)
@@ -143,7 +148,8 @@ def test_a_full_disk_is_reported_once_and_leaves_no_outdated_file(
     assert len(reports) == 1
     assert 'authority_uav_1.json: not written: [Errno 28] No space left on device' in reports[0]
     assert 'after a restart of the bridge an airborne vehicle is left to its pilot' in reports[0]
-    assert list(store.path('x').parent.iterdir()) == []
+    assert [store.path(uav).read_text() for uav in ('uav_1', 'uav_2')] == ['', '']
+    assert AuthorityFileStore(str(store.path('x').parent), [].append).load('uav_2') is UNUSABLE
     monkeypatch.undo()
     store.retry()
     assert (store.load('uav_1').since, store.load('uav_2')) == (2.0, FULL)
@@ -162,10 +168,10 @@ def test_a_folder_that_becomes_read_only_is_reported_with_the_outdated_file(
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr(os, 'replace', read_only)
-    monkeypatch.setattr(type(store.path('x')), 'unlink', read_only)
+    monkeypatch.setattr(os, 'truncate', read_only)
     store.save('uav_1', AuthorityRecord(AuthorityState.LOST))
     assert len(reports) == 1
-    assert 'what it holds is out of date, and it cannot be removed' in reports[0]
+    assert 'what it holds is out of date, and it cannot be emptied' in reports[0]
 
 
 def test_one_file_that_cannot_be_written_does_not_affect_the_others(store, reports):
@@ -226,12 +232,12 @@ def set_field(name, value):
 def test_a_file_that_cannot_be_used_is_reported_and_ignored(store, reports, damage, words):
     store.save('uav_1', FULL)
     damage(store.path('uav_1'))
-    assert store.load('uav_1') is None
+    assert store.load('uav_1') is UNUSABLE
     assert len(reports) == 1
     assert re.search(words, reports[0])
     assert reports[0].startswith(str(store.path('uav_1')))
-    assert reports[0].endswith(
-        'an airborne uav_1 is left to its pilot unless it flies our mission')
+    assert reports[0].endswith('an airborne uav_1 is left to its pilot unless it flies our '
+                               'mission, and on the ground it waits for ~/hand_over')
 
 
 def test_load_returns_a_record_or_none_for_any_content(store, reports):

@@ -294,6 +294,9 @@ class Watch:
     def record_command(self, message, now):
         self.commands.append(message)
 
+    def record_upload(self):
+        self.uploads += 1
+
 
 @pytest.mark.parametrize('state', [N, H, S, L])
 def test_the_gate_keeps_the_order_of_allowed_messages_and_records_commands(state):
@@ -305,6 +308,7 @@ def test_the_gate_keeps_the_order_of_allowed_messages_and_records_commands(state
                    *(UPLOADS if SendAction.UPLOAD in SENT[state] else []),
                    *(READS if SendAction.READ in SENT[state] else [])]
     assert watch.commands == (commands if state is H else [])
+    assert watch.uploads == sum(m.get_type() == 'MISSION_COUNT' for m in out)
 
 
 # the generated table

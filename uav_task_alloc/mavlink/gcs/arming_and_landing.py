@@ -13,9 +13,12 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.sent_commands import COMMAND_LIFETIME
+from uav_task_alloc.mavlink.gcs.telemetry import DISARM_PAUSE
 
 # [0..1] a battery of at least this, which is fuller than at the landing by that, was changed
 _FULL, _RISE = 0.9, 0.05
+_AT_REST = 0.3  # [m/s], less than the last part of a descent (LAND_SPEED, MPC_LAND_SPEED)
+_FALL = 1.5  # [m] in DISARM_PAUSE
 
 
 class ArmingAndLanding:
@@ -31,6 +34,7 @@ class ArmingAndLanding:
                  policy: Callable[[], Policy]) -> None:
         self._state, self._evidence, self._policy = state, evidence, policy
         self._landed_at = -math.inf  # [s] after our RETURN
+        self._disarmed_at, self._height = -math.inf, math.nan  # [s], and how high [m] it was then
 
     def is_returning(self, now: float) -> bool:
         """Whether it returns by our command: the mode, or the last item.
@@ -63,21 +67,44 @@ class ArmingAndLanding:
                 state.apply(AuthorityEvent.OWN, now, 'armed by the bridge')
             else:
                 state.apply(AuthorityEvent.ARMED_BY_OTHER, now, 'armed, not by the bridge')
-        elif was_returning:
+        else:
+            self._disarmed(was_returning, now)
+
+    def _disarmed(self, was_returning: bool, now: float) -> None:
+        """Apply a disarming: in the air it is a kill, whatever came before."""
+        state = self._state
+        expected = now <= max(state.sent.disarm_until, self._landed_at + COMMAND_LIFETIME)
+        self._landed_at = state.sent.disarm_until = -math.inf  # it explains one disarming
+        if self._is_off_ground(may_land=was_returning or expected):
+            state.apply(AuthorityEvent.KILLED, now, 'disarmed in the air')
+            return
+        self._disarmed_at, self._height = now, state.telemetry.height
+        if was_returning:
             self._apply_landing(now)
-        elif now <= max(state.sent.disarm_until, self._landed_at + COMMAND_LIFETIME):
+            self._landed_at = -math.inf
+        elif expected:
             state.apply(AuthorityEvent.OWN, now, 'disarmed by the bridge, or after its landing')
             self._await_battery_change()
-        elif state.was_airborne and self._is_off_ground():
-            state.apply(AuthorityEvent.KILLED, now, 'disarmed in the air')
         else:
             state.apply(AuthorityEvent.ARMED_BY_OTHER, now, 'disarmed, not by the bridge')
 
-    def _is_off_ground(self) -> bool:
-        """By height and landed_state: that one comes at 1 Hz, and the ground may not be level."""
+    def _is_off_ground(self, may_land: bool) -> bool:
+        """By height and landed_state: that one comes at 1 Hz, and the ground may not be level.
+
+        Args:
+            may_land: whether a landing is expected: before it is disarmed it has been at rest.
+        """
         telemetry = self._state.telemetry
-        return (telemetry.height > OFF_GROUND
+        high = (self._state.was_airborne and telemetry.height > OFF_GROUND
                 and telemetry.landed != d.MAV_LANDED_STATE_ON_GROUND)
+        return high and not (may_land and telemetry.speed < _AT_REST)
+
+    def _check_fall(self, now: float) -> None:
+        """Apply a kill where it falls after it was disarmed at rest."""
+        if now - self._disarmed_at <= DISARM_PAUSE and not self._state.armed and (
+                self._state.telemetry.height < self._height - _FALL):
+            self._disarmed_at = -math.inf
+            self._state.apply(AuthorityEvent.KILLED, now, 'fell after it was disarmed')
 
     def _apply_landing(self, now: float) -> None:
         state, relaunches = self._state, self._relaunches()
@@ -111,6 +138,7 @@ class ArmingAndLanding:
     def step(self, now: float) -> None:
         """Apply a landing, or a take-off in a MISSION mode that another station has set."""
         state, telemetry = self._state, self._state.telemetry
+        self._check_fall(now)
         self._apply_battery_change(now)
         if state.hold_due and (telemetry.airborne or telemetry.grounded):
             state.hold_due = False

@@ -66,3 +66,7 @@ class AuthorityRecord:
     pieces: tuple[PieceMark, ...] = ()  # that are partly flown
     # the next tasks on board, with the one being flown; at 0 s, flown: passed, and seen there
     ahead: tuple[TaskMark, ...] = ()
+
+
+# of a file that cannot be used: what it held is not known
+UNUSABLE = AuthorityRecord(AuthorityState.UNKNOWN, 'its authority file cannot be used')

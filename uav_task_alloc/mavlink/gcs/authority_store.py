@@ -20,7 +20,12 @@ from urllib.parse import quote
 
 from uav_task_alloc.atomic_files import replace_file, sync_folder
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState, TaskMark
+from uav_task_alloc.mavlink.gcs.authority_state import (
+    UNUSABLE,
+    AuthorityRecord,
+    AuthorityState,
+    TaskMark,
+)
 from uav_task_alloc.mavlink.mission.piece_mark import PART_FLOWN, PART_MISSED, PieceMark
 
 _POSITION, _POSITION_SUFFIX = 'seen', '.position'  # field with a file of its own
@@ -31,7 +36,7 @@ _TIME_LIMIT = 1e11  # [s] of a steady clock
 LONG_AGO = -1e9  # [s] steady time of events before the last boot of the computer
 _BOOT_ID = Path('/proc/sys/kernel/random/boot_id')
 _CONSEQUENCE = ('after a restart of the bridge an airborne vehicle is left to its pilot unless '
-                'it flies our mission')
+                'it flies our mission, and one on the ground waits for ~/hand_over')
 
 
 def boot_id() -> str:
@@ -96,7 +101,7 @@ class AuthorityFileStore:
             uav_id: of the UAV.
 
         Returns:
-            None where there is no file, or where it cannot be used, which is reported.
+            None where there is no file; `UNUSABLE` where it cannot be used, which is reported.
         """
         path = self.path(uav_id)
         try:
@@ -106,8 +111,9 @@ class AuthorityFileStore:
             return None
         except (OSError, ValueError, RecursionError) as error:
             self._report(f'{path}: {error or type(error).__name__}: not used; an airborne '
-                         f'{uav_id} is left to its pilot unless it flies our mission')
-            return None
+                         f'{uav_id} is left to its pilot unless it flies our mission, and on the '
+                         'ground it waits for ~/hand_over')
+            return UNUSABLE
         if body['boot'] != self._boot:
             record = replace(record, since=0.0, marks=(),
                              replacing_since=None if record.replacing_since is None else LONG_AGO)
@@ -142,7 +148,7 @@ class AuthorityFileStore:
             try:
                 replace_file(path, self._text(uav_id, record))
             except (OSError, ValueError) as error:
-                error_text = f'{path}: not written: {error}{self._remove(path)}'
+                error_text = f'{path}: not written: {error}{self._empty(path)}'
                 first_error = first_error or error_text
             else:
                 del self._unsaved[uav_id]
@@ -153,13 +159,17 @@ class AuthorityFileStore:
             self._report(f'{self._folder}: written again')
         self._error = first_error
 
-    def _remove(self, path: Path) -> str:
-        """Remove an outdated file; returns an error text, '' where it is removed."""
+    def _empty(self, path: Path) -> str:
+        """Empty an outdated file, which needs no space; returns an error text, '' for success.
+
+        A file that is missing would look like a first run.
+        """
         try:
-            path.unlink(missing_ok=True)
+            path.touch()
+            os.truncate(path, 0)
             sync_folder(self._folder)
         except OSError as error:
-            return f'; what it holds is out of date, and it cannot be removed: {error}'
+            return f'; what it holds is out of date, and it cannot be emptied: {error}'
         return ''
 
     def _text(self, uav_id: str, record: AuthorityRecord) -> str:

@@ -10,7 +10,7 @@ from uav_task_alloc.mavlink.autopilots import Profile
 from uav_task_alloc.mavlink.gcs.arming_and_landing import ArmingAndLanding
 from uav_task_alloc.mavlink.gcs.authority import Authority, AuthorityEvent
 from uav_task_alloc.mavlink.gcs.authority_recorder import AuthorityRecorder
-from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, TaskMark
+from uav_task_alloc.mavlink.gcs.authority_state import UNUSABLE, AuthorityRecord, TaskMark
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.bridge_restart import BridgeRestart
 from uav_task_alloc.mavlink.gcs.climb_check import ClimbCheck
@@ -43,11 +43,13 @@ class AuthorityWatch:
     Attributes:
         authority: the state, and what may be sent.
         notes: for the operator, oldest first; the caller removes them.
+        continues_climb: the previous run has taken it off, and no mode was set since.
     """
 
     def __init__(self, profile: Profile, telemetry: Telemetry, evidence: MissionEvidence,
                  policy: Callable[[], Policy], now: float, record: AuthorityRecord | None = None,
                  save: Callable[[AuthorityRecord], None] = lambda record: None) -> None:
+        found, record = record, None if record is UNUSABLE else record
         self.authority = Authority(now, record)
         self._state = state = AuthorityWatchState(
             profile, telemetry, self.authority,
@@ -55,13 +57,18 @@ class AuthorityWatch:
             flown=record.flown if record else False)
         self.notes = state.notes
         self._evidence, self._policy = evidence, policy
-        self._restart = BridgeRestart(state, evidence, policy, record)
+        self._restart = BridgeRestart(state, evidence, policy, found)
         self._link = LinkLoss(state)
         self._modes = ModeChanges(state, evidence)
         self._arming = ArmingAndLanding(state, evidence, policy)
         self._hand_over = HandOver(state, evidence, policy)
         self._grant = TakeoffGrant(state, policy)
         self._climb = ClimbCheck(state, evidence)
+        # ArduPilot, in GUIDED: nothing else shows that it still climbs
+        climb = None if record is None or profile.takeoff_mode is not None else record.climb
+        self.continues_climb = climb is not None and record is not None and record.armed
+        if self.continues_climb and climb is not None:
+            self._climb.begin(climb)
         self._recorder = AuthorityRecorder(state, evidence, record, save)
 
     @property
@@ -189,11 +196,14 @@ class AuthorityWatch:
         elif message.command == d.MAV_CMD_NAV_TAKEOFF:
             state.descending = False
             self._climb.begin(self._policy().cruise_altitude)
-            takeoff_mode = state.profile.takeoff_mode
+            sent.climb, takeoff_mode = self._policy().cruise_altitude, state.profile.takeoff_mode
             if takeoff_mode is not None:
                 sent.acks.command_sent(message.command, takeoff_mode, now)
                 sent.add_mode(takeoff_mode, now)
-                sent.climb = self._policy().cruise_altitude
+        self._save_record()
+
+    def record_upload(self) -> None:
+        """Record an upload that is about to begin; the record is saved when this returns."""
         self._save_record()
 
     def hand_over(self, operator: str, now: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from uav_task_alloc.mavlink.gcs.clock_rate import ClockRate
 
@@ -76,6 +77,13 @@ class BootClock:
             self.restart(boot_ms, now)
             return now - 1e-3 * boot_ms / (1.0 if math.isnan(rate) else rate)
         return None
+
+    def forecast(self) -> Callable[[float], float] | None:
+        """Return what gives `time_boot_ms` at a later steady time [s]; None: not known yet."""
+        boot_ms, at, rate = self.boot_ms, self._at, self.rate.value
+        if not boot_ms or math.isnan(rate):
+            return None
+        return lambda later: boot_ms + 1000.0 * rate * (later - at)
 
     def is_of_before(self, boot_ms: int, now: float) -> bool:
         """Whether a message is of before the latest restart: no clock advances that fast.

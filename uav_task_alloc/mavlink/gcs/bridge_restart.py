@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent
 from uav_task_alloc.mavlink.gcs.authority_recorder import LANDING_RADIUS
-from uav_task_alloc.mavlink.gcs.authority_state import AuthorityRecord, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_state import UNUSABLE, AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass
 from uav_task_alloc.mavlink.gcs.hand_over import REST_SPEED
@@ -19,6 +19,7 @@ _BRAKING_TIME = 10.0  # [s] from the HOLD command until the vehicle is at rest
 _CLIMB_ERROR = 0.1  # of the height of a take-off, by which its end differs at most
 # vehicle time, and east and north, of the newest position in `AuthorityRecord.seen`
 _TIME, _PLACE = -7, slice(-6, -4)
+_CLOCK_TIME = 3.0  # [s] in which a message with the clock of the vehicle comes
 _FRESH = 3.0  # [s] since a heartbeat that still shows the present mode
 _DRIFT = 5.0  # [m] from home at most where a take-off ends
 
@@ -30,20 +31,22 @@ class BridgeRestart:
         state: of the vehicle; changed by the methods.
         evidence: of its mission.
         policy: returns the present parameters.
-        record: of the previous run; None: there is none.
+        record: of the previous run; None: there is none; UNUSABLE: it cannot be used.
     """
 
     def __init__(self, state: AuthorityWatchState, evidence: MissionEvidence,
                  policy: Callable[[], Policy], record: AuthorityRecord | None) -> None:
         self._state, self._evidence, self._policy = state, evidence, policy
-        self._record = record  # None once it is compared
+        self._record = None if record is UNUSABLE else record  # None once it is compared
+        self._unusable = record is UNUSABLE  # until it is handed over
         self._first_at: float | None = None  # [s] the first heartbeat of this run
+        self._awaits_clock = False  # to compare the record with the latest heartbeat
         self._armed_at_start = False  # it was armed before the bridge started
         self._mission: int | None = None  # checksum of one that may have ended while it was down
         self._held_in: int | None = None  # custom_mode, of a HOLD that may be its end
         self._landed_in: int | None = None  # custom_mode, of a landing of its own meanwhile
         self._landing: AuthorityRecord | None = None  # while it came down to land
-        if record is None:
+        if self._record is None:
             state.authority.undecided = True
 
     @property
@@ -62,7 +65,13 @@ class BridgeRestart:
             self._record = None
             self._await_battery_change(record)
             return
-        agrees = self._agrees(record)
+        rebooted = self._rebooted(record)
+        self._awaits_clock = rebooted is None and now - self._first_at < _CLOCK_TIME
+        if self._awaits_clock:
+            return
+        # the rates that the previous run has asked for end only with a reboot
+        rebooted = rebooted is not False
+        agrees = self._agrees(record) and not rebooted
         if agrees and record.replacing_since is not None and (
                 state.class_of(state.mode) is ModeClass.HOLD):
             at_rest = self._at_rest(record.replacing_since, now)
@@ -70,7 +79,7 @@ class BridgeRestart:
                 return  # decided at a later heartbeat
             agrees = at_rest
             state.replacing_since = record.replacing_since if agrees else None
-        if not agrees and self._may_have_climbed(record):
+        if not (agrees or rebooted) and self._may_have_climbed(record):
             climbed = self._has_climbed(record.climb or 0.0)
             if climbed is None and now - self._first_at < _BRAKING_TIME:
                 return
@@ -79,7 +88,7 @@ class BridgeRestart:
         self._record = None
         self._apply_result(record, agrees, now)
         self._await_battery_change(record)
-        if not agrees and self._landing is None:
+        if not (agrees or rebooted) and self._landing is None:
             self._may_have_ended(record)
 
     def _await_battery_change(self, record: AuthorityRecord) -> None:
@@ -120,6 +129,16 @@ class BridgeRestart:
         same = state.class_of(state.mode) is None or (
             state.mode in (record.mode, *record.commanded))
         return same and (state.armed == record.armed or (state.armed and record.arming))
+
+    def _rebooted(self, record: AuthorityRecord) -> bool | None:
+        """Whether it was rebooted since a flight of the previous run; None: its clock is awaited.
+
+        Another may have flown it since, in the same mode.
+        """
+        if not (record.flown and record.seen and self._state.armed):
+            return False
+        boot = 1e-3 * self._state.telemetry.boot_ms
+        return boot < record.seen[_TIME] if boot else None
 
     def _may_have_climbed(self, record: AuthorityRecord) -> bool:
         """Whether our take-off may have ended in HOLD while no bridge ran (PX4)."""
@@ -164,7 +183,10 @@ class BridgeRestart:
 
     def step(self, now: float) -> None:
         """Decide what the first heartbeat alone could not show."""
+        if self._awaits_clock and self._state.telemetry.boot_ms:
+            self.receive_heartbeat(now)
         self._decide_without_record(now)
+        self._await_hand_over()
         state, authority = self._state, self._state.authority
         if authority.state is not AuthorityState.LOST:
             return
@@ -174,9 +196,12 @@ class BridgeRestart:
             state.apply(AuthorityEvent.RESTART_OURS, now, f'{what} at the end of our mission')
         if self._landing is not None:
             self._find_landing()
-        if self._landed_in is not None and state.telemetry.battery >= 0.0:
-            if state.mode == self._landed_in and not state.armed and state.telemetry.grounded:
-                state.landed_battery = state.telemetry.battery
+        home, telemetry = state.telemetry.home, state.telemetry
+        if self._landed_in is not None and telemetry.battery >= 0.0 and (
+                telemetry.has_position and home is not None):
+            if (state.mode == self._landed_in and not state.armed and telemetry.grounded
+                    and math.dist(telemetry.position[:2], home[:2]) <= LANDING_RADIUS):
+                state.landed_battery = telemetry.battery
             self._landed_in = None
 
     def _find_landing(self) -> None:
@@ -205,6 +230,14 @@ class BridgeRestart:
         if not holds:
             return state.is_return(state.mode) and evidence.returning()
         return evidence.holds_at_end() and state.telemetry.speed < REST_SPEED
+
+    def _await_hand_over(self) -> None:
+        """Keep a vehicle on the ground that may have been taken, or killed, in the last run."""
+        authority = self._state.authority
+        if self._unusable and not authority.undecided:
+            self._unusable = authority.state is AuthorityState.NONE
+            if self._unusable and self._policy().takeoff and not authority.landed:
+                authority.landed, authority.why = True, UNUSABLE.why
 
     def _decide_without_record(self, now: float) -> None:
         """Decide after a start without a record: on the ground, or airborne."""

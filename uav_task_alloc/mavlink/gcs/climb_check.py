@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 
@@ -42,11 +43,13 @@ class ClimbCheck:
         goal, telemetry = self._goal, self._state.telemetry
         if goal is None:
             return
-        if not self._state.authority.held or telemetry.height >= CLIMBED * goal:
+        state = self._state.authority.state
+        if state in (AuthorityState.LOST, AuthorityState.NONE) or (
+                telemetry.height >= CLIMBED * goal):
             self._goal = None
             return
-        at = self._evidence.position_time()
-        if not telemetry.airborne or not telemetry.height < self._highest + _RISE:
+        at, suspended = self._evidence.position_time(), state is AuthorityState.SUSPENDED
+        if suspended or not telemetry.airborne or not telemetry.height < self._highest + _RISE:
             self._highest, self._risen_at = telemetry.height, at
         elif at - self._risen_at >= _STOPPED:
             self._goal = None

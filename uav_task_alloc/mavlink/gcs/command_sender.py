@@ -13,14 +13,13 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.command import Command, CommandResult
-from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.telemetry import DISARM_PAUSE, Telemetry
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 _ARM, _SET_CURRENT = 'arm', 'set current'
 _ARM_ATTEMPTS = 120  # one per second: a position estimate may take that long
-_CLIMB_LIMIT = 120.0  # [s] for a take-off
 _REACHED_HEIGHT = 0.9  # fraction of the commanded height
 _RETRY, _RETRIES = 10.0, 5  # [s] after a failure that may be temporary
 _SLOW_RETRY = 60.0  # [s] after more failures, without limit
@@ -57,7 +56,6 @@ class CommandSender:
         self._reads = False  # a message was processed since the open command was continued last
         self._command: Command | None = None
         self._completion: _Completion | None = None
-        self._climb_until = math.inf
         self._logged_wait = ''
         self._logged: dict[str, str] = {}  # reason logged last, by the name of the failed command
         self._arming_since: float | None = None  # [s] of the first of the failing attempts
@@ -97,14 +95,15 @@ class CommandSender:
             telemetry.mode is not ModeFunction.HOLD and not climbs)
 
     def drop(self) -> None:
-        """Drop the open command and its state: another party controls the vehicle."""
+        """Drop the open command and its state, but not a climb, which the vehicle continues."""
         self._command = self._arming_since = None
-        self.climbing = self.must_start = self.armed_here = False
+        self.must_start = self.armed_here = False
         self.commanded, self.mission_refused = None, ''
 
     def reset(self, now: float) -> None:
         """Drop everything after a restart of the vehicle."""
         self.drop()
+        self.climbing = False
         self.current_set_at.clear()
         self.clear_backoff(now)
 
@@ -273,6 +272,8 @@ class CommandSender:
             return self.set_mode(ModeFunction.HOLD, now)
         if not telemetry.armed:
             self.armed_here = False
+            if now - telemetry.disarmed_at < DISARM_PAUSE:
+                return self.wait_for('a moment after it was disarmed')
             arm = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
             if self._arming_since is None:
                 self._arming_since, self.arming_refusal = now, ''
@@ -301,8 +302,7 @@ class CommandSender:
         self._telemetry.armed = self.armed_here = True
 
     def _took_off(self, now: float) -> None:
-        self.climbing, self._climb_until = True, now + _CLIMB_LIMIT
-        self.armed_here = False
+        self.climbing, self.armed_here = True, False
         self.commanded = ModeFunction.TAKEOFF
 
     def _climb(self, height: float, now: float) -> NextMessages:
@@ -310,7 +310,7 @@ class CommandSender:
             self.climbing, self.must_start = False, True
             return None
         self.waits_for = 'its height'
-        if now > self._climb_until or not self._telemetry.armed:
+        if not self._telemetry.armed:
             self.climbing = False
             self.fail(now)
         return []

@@ -105,6 +105,7 @@ class EndOfList:
             self._sender.wait(f'a path home: {blocked}')
         if flying or (returns and telemetry.mode in (ModeFunction.HOLD, ModeFunction.MISSION)):
             mode = ModeFunction.RETURN if returns else ModeFunction.HOLD
+            self._watch.replacing_since = None
             return self._sender.set_mode(mode, now)
         return self._stay_at_end(now)
 

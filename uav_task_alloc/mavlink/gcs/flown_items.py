@@ -108,8 +108,8 @@ class FlownItems:
         flown, seen = self._items(now), self.seen_passed.among(tasks, now)
         if not flown:
             return seen
-        named = [task for task in tasks
-                 if now < self._until or self.ahead.get(task.id) == task.position]
+        named = [task for task in tasks if self.ahead.get(task.id) == task.position or (
+            now < self._until and not self._is_of_another(task))]
         found = []
         for turned in (False, True):
             stops = tuple(MissionStop(t, reversed=turned) for t in named if t.path or not turned)
@@ -118,6 +118,11 @@ class FlownItems:
                 alike(ends[stop.task.id], other) and self._is_flown(stop.task, other)
                 and self._comes_along(stop, other) for other in flown)]
         return tuple(dict.fromkeys((*seen, *found)))
+
+    def _is_of_another(self, task: Task) -> bool:
+        """Whether the previous run has recorded the place as that of another task."""
+        return task.id not in self.ahead and any(
+            math.dist(place, place_of(task)) <= _SAME_PLACE for place in self.ahead.values())
 
     def _comes_along(self, stop: MissionStop, last: Item) -> bool:
         """Whether the items before the last one of a way are of that way; ways share points."""

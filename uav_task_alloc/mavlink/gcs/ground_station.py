@@ -238,8 +238,9 @@ class GroundStation:
         self._compared = known
         for (_, assigned), (other, executor) in permutations(executors, 2):
             if assigned.onboard.tasks is not None:
-                assigned.drop_flown(executor.onboard.resume.flown.tasks_among(
-                    assigned.onboard.list.open_tasks(), now), other)
+                allowed = [task for task in assigned.onboard.list.open_tasks()
+                           if task.allowed_uavs is None or other in task.allowed_uavs]
+                assigned.drop_flown(executor.onboard.resume.flown.tasks_among(allowed, now), other)
 
     def _discover(self, address: RemoteKey, message: Message, now: float) -> VehicleSession | None:
         config, system = self._config, message.get_srcSystem()

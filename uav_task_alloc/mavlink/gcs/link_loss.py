@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -14,7 +15,11 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import (
     UnexplainedChange,
 )
 from uav_task_alloc.mavlink.gcs.link_times import STALE
+from uav_task_alloc.mavlink.gcs.telemetry import UNKNOWN
 
+_CLOCK_TIME = 3.0  # [s] in which a message with the clock comes
+_SAME_CLOCK = 8000.0  # [ms] by which the clock of one vehicle differs at most, with late messages
+_SAME_PLACE, _FASTEST = 100.0, 40.0  # [m], and [m/s], by which its place differs at most
 _HEARTBEAT_DELAY = 1.0  # [s]; one received later than that after a boot was sent after it
 
 
@@ -28,6 +33,10 @@ class LinkLoss:
     def __init__(self, state: AuthorityWatchState) -> None:
         self._state = state
         self.was_lost = False  # the link was, and the mode is not confirmed yet
+        # the clock of the vehicle before a new address, with the time [s] of that
+        self._forecast: Callable[[float], float] | None = None
+        self._moved_at = self._position_at = -math.inf
+        self._position = UNKNOWN  # [m] ENU before it
         # modes and armed states that count as unchanged when the link is back
         self._modes: frozenset[int | None] = frozenset()
         self._armed: frozenset[bool] = frozenset()
@@ -44,6 +53,9 @@ class LinkLoss:
         """Await a heartbeat: the messages may come from another vehicle with the same id."""
         if not self._state.unconfirmed:
             self._expect_unchanged(now)
+        telemetry = self._state.telemetry
+        self._forecast, self._moved_at = telemetry.clock_forecast(), now
+        self._position, self._position_at = telemetry.position, telemetry.position_at
         self._state.apply(AuthorityEvent.NEW_ADDRESS, now, 'its messages come from a new address')
 
     def _expect_unchanged(self, now: float) -> None:
@@ -66,6 +78,8 @@ class LinkLoss:
                     now > state.sent.arm_until):  # no vehicle boots armed
                 state.apply(AuthorityEvent.ARMED_BY_OTHER, now, 'armed, not by the bridge')
             return
+        if self._forecast is not None and self._awaits_clock(self._forecast, now):
+            return
         if (state.mode in self._modes and state.armed in self._armed) or (
                 state.booting and not (state.flown or state.armed)):
             state.unconfirmed = False
@@ -81,6 +95,26 @@ class LinkLoss:
             state.apply(AuthorityEvent.LINK_CHANGED, now, why)
         elif state.unexplained is None:  # its clock will show whether it rebooted
             state.unexplained = UnexplainedChange(now + EXPLANATION_TIME, lambda t: False, why)
+
+    def _awaits_clock(self, forecast: Callable[[float], float], now: float) -> bool:
+        """Whether the clock at a new address is awaited, or shows another vehicle in flight.
+
+        A vehicle continues to send what was asked for: one that sends no clock is another one.
+        """
+        state, telemetry = self._state, self._state.telemetry
+        known = telemetry.boot_ms > 0 and telemetry.has_position
+        if not known and now - self._moved_at < _CLOCK_TIME:
+            return True
+        self._forecast = None
+        reach = _SAME_PLACE + _FASTEST * (now - self._position_at)
+        same = known and abs(telemetry.boot_ms - forecast(now)) <= _SAME_CLOCK and (
+            not math.dist(telemetry.position, self._position) > reach)
+        if same or not (state.flown or state.armed):
+            return False
+        state.unconfirmed = False
+        state.apply(AuthorityEvent.LINK_CHANGED, now, 'by its clock or place the vehicle at its '
+                    'new address is another one')
+        return True
 
     def vehicle_rebooted(self, now: float) -> None:
         """Apply a reboot of the vehicle, of which its clock went back."""

@@ -98,6 +98,7 @@ class MissionExecutor:
         self.holds = HoldRule(self.sender, self.telemetry, self.watch, profile, self.onboard,
                               execution.update_mission, self.notes)
         restore_record(record, self.onboard, self.watch, profile)
+        self.sender.climbing = self.watch.continues_climb
         progress = self.onboard.progress
         self._news = (progress.events, progress.passed_over, progress.uncovered, progress.skipped,
                       self.onboard.list.failed)
@@ -222,6 +223,7 @@ class MissionExecutor:
 
     def _act(self, now: float) -> list[Message]:
         self._report(now)  # the marks are saved with the current item that is past their tasks
+        self.onboard.check_replaced()
         self.watch.step(now)
         self.onboard.complete_flown(now)
         for rule in self._rules:
@@ -275,6 +277,8 @@ class MissionExecutor:
             return None
         if not self.authority.allows(SendAction.COMMAND):
             self.sender.drop()
+        if self.authority.state in (AuthorityState.LOST, AuthorityState.NONE):
+            self.sender.climbing = False
         if not self.authority.allows(SendAction.READ):
             return self.sender.wait_for(f'authority: {self.authority.why}')
         # begun on the ground, it would replace the mission that a pilot flies now
@@ -305,9 +309,11 @@ class MissionExecutor:
         if authority.hold is HoldStage.NO or not self.telemetry.airborne:
             authority.hold = HoldStage.NO
             return None
-        if mode is ModeFunction.HOLD or (
-                authority.hold is HoldStage.UNLESS_VERIFIED
-                and mode is ModeFunction.MISSION and self.onboard.verified()):
+        unless_verified = authority.hold is HoldStage.UNLESS_VERIFIED and (
+            mode is ModeFunction.MISSION)
+        if unless_verified and not self.onboard.mission.read_since(authority.since):
+            return []  # another may have replaced it
+        if mode is ModeFunction.HOLD or (unless_verified and self.onboard.verified()):
             self.sender.must_start = mode is ModeFunction.HOLD
             authority.hold = HoldStage.NO
             return None

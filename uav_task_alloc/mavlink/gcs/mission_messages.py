@@ -15,6 +15,8 @@ from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
+_CHANGED = 'Auto mission changed'  # ArduPilot, in AUTO
+
 
 class MissionMessages:
     """Passes messages on to the progress of the mission on board, and status texts to the rules.
@@ -71,6 +73,9 @@ class MissionMessages:
             self._watch.receive_status_text(message, now)
             self._sender.note_arming_refusal(str(message.text))
             self._onboard.list.horizon.note(str(message.text))
+            if str(message.text).startswith(_CHANGED) and not (
+                    self._sender.busy or self._onboard.open):
+                self._onboard.mission.note_changed(now)
             self._notes += filter(None, (self._status_text_log.receive(message, now),))
 
     def _position(self, message: Message, newest: bool, now: float) -> None:

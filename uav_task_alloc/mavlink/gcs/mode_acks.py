@@ -36,18 +36,24 @@ class ModeAcks:
         self._pending.append((command, mode))
         self._entered, self._sent_at = None, now
 
-    def acknowledged(self, command: int, result: int, frame: int) -> None:
-        """Process the MAV_RESULT of a MAV_CMD, and the number of its frame."""
+    def acknowledged(self, command: int, result: int, frame: int) -> int | None:
+        """Process the MAV_RESULT of a MAV_CMD, and the number of its frame.
+
+        Returns:
+            The custom_mode that is refused; None: none, or it is not known which.
+        """
         mode = next((mode for sent, mode in reversed(self._pending) if sent == command), None)
         if mode is None or result == d.MAV_RESULT_IN_PROGRESS:
-            return
+            return None
         self._pending.remove((command, mode))
         if self._pending and self._mixed:
-            return
+            return None
+        refused = result != d.MAV_RESULT_ACCEPTED and not self._mixed
         accepted = result == d.MAV_RESULT_ACCEPTED and not self._mixed
         if accepted:
             self._frame = min(frame, self._frame) if self._entered == mode else frame
         self._entered, self._mixed = mode if accepted else None, False
+        return mode if refused else None
 
     def mode_entered_by(self, frame: int) -> int | None:
         """The mode that our command had set before this frame was sent; None: not known."""

@@ -69,6 +69,7 @@ class OnboardMission:
         self._unconfirmed: tuple[MissionDiff, TaskList] | None = None  # sent; perhaps on board
         self.item_time = self.upload_started_at = 0.0  # [s] per item, smoothed; of the latest
         self._completed_for: tuple[TaskList, int] | None = None
+        self._perhaps_foreign = False  # read after a restart, and not the recorded mission
         self._flown_unset: int | None = None  # flown though `set_current_to` is not set yet
 
     @property
@@ -278,6 +279,15 @@ class OnboardMission:
         """Check a MISSION_CURRENT for changes by another party; a doubt leads to a readback."""
         self.mission.check_current(message, now)
 
+    def check_replaced(self) -> None:
+        """Find a mission that another station has put on board in flight while no bridge ran."""
+        if not self._perhaps_foreign or not (self._telemetry.airborne or self._telemetry.grounded):
+            return
+        self._perhaps_foreign = False
+        if self._telemetry.airborne and self.held and not (
+                self.tasks is not None and self._changes.can_continue(self.held)):
+            self.mission.note_foreign()
+
     def complete_flown(self, now: float) -> None:
         """Complete the tasks that the vehicle has flown while the bridge was down."""
         flown = self.resume.flown.count(now)
@@ -359,6 +369,7 @@ class OnboardMission:
                 lambda: self._changes.can_continue(held), now):
             self._reports.confirm()
             return
+        self._perhaps_foreign = self.resume.replaced(held)
         self.resume.flown.keep()
         if self._correct(held, now):
             return

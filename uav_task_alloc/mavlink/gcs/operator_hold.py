@@ -93,7 +93,10 @@ class HoldRule:
         self._guard(now)
         if not self._requests or not self._telemetry.airborne or self._sender.climbing:
             return None
-        self._watch.replacing_since = None  # it holds for longer than an upload takes
+        if not self._at_zone:
+            self._watch.replacing_since = None  # it holds for longer than an upload takes
+        elif self._watch.replacing_since is None and self._watch.authority.held:
+            self._watch.replacing_since = now
         if not self._watch.authority.held:
             self._log(f'hold is not sent: authority is {self._watch.authority.state.name}: '
                       f'{self._watch.authority.why}')
@@ -109,11 +112,17 @@ class HoldRule:
             return []
         return self._sender.set_mode(ModeFunction.HOLD, now)
 
+    @property
+    def _at_zone(self) -> bool:
+        """Whether only a zone on its way holds it."""
+        return self._requests.keys() == {_ZONE}
+
     def _guard(self, now: float) -> None:
         """Hold before a zone to which the mission on board leads, until it has the list."""
-        held, flying = _ZONE in self._requests, self._telemetry.mode is ModeFunction.MISSION
-        may_fly = self._telemetry.airborne and self._watch.authority.held
-        zone = self._zone_ahead.on_board(held) if may_fly and (held or flying) else None
+        held, mode = _ZONE in self._requests, self._telemetry.mode
+        may_fly = self._telemetry.airborne and self._watch.authority.held and (
+            mode is ModeFunction.MISSION or (held and mode is ModeFunction.HOLD))
+        zone = self._zone_ahead.on_board(held) if may_fly else None
         if zone is None or self._onboard.verified():
             self._end(_ZONE)
         elif not held and ModeFunction.HOLD in self._profile.set_mode and not (
@@ -125,7 +134,10 @@ class HoldRule:
         """Let the list be transferred while it holds, but no more; None: it is not to hold."""
         if not self._requests or self._sender.climbing:
             return None
-        out = self._update_mission(now) if self._onboard.remaining().stops else None
+        stops = self._onboard.remaining().stops
+        if self._at_zone and not stops:
+            return None  # it holds, waits or returns by its list
+        out = self._update_mission(now) if stops else None
         if out is not None:
             return out
         return self._sender.wait_for(f'the end of its hold ({self.reason})')

@@ -105,6 +105,16 @@ class Resume:
         return self._unread.take_reached(
             self._placed(held), recorded if mission == checksum(held) else None, now)
 
+    def replaced(self, held: tuple[Item, ...]) -> bool:
+        """Whether a mission is neither the one that the previous run recorded nor its upload.
+
+        Args:
+            held: the items on board, without home, as they are read first.
+        """
+        mission, recorded_upload = self.recorded[0], self.recorded_upload
+        return bool(held) and not (self.located or self.was_disarmed or recorded_upload) and (
+            mission is not None and mission != checksum(held))
+
     def awaits_position(self, held: tuple[Item, ...], read_at: float, now: float) -> bool:
         """Whether what locates the vehicle is still to come.
 

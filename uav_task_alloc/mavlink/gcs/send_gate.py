@@ -45,5 +45,7 @@ def allowed_messages(messages: list[Message], watch: AuthorityWatch, now: float)
         if watch.authority.allows(action):
             if action is SendAction.COMMAND:
                 watch.record_command(message, now)
+            elif message.get_type() == 'MISSION_COUNT':
+                watch.record_upload()
             allowed.append(message)
     return allowed

@@ -49,10 +49,20 @@ class SentCommands:
 
     def receive_command_ack(self, message: Message, frame: int) -> None:
         """Process a COMMAND_ACK that is addressed to us, and the number of its frame."""
-        self.acks.acknowledged(message.command, message.result, frame)
+        refused = self.acks.acknowledged(message.command, message.result, frame)
+        if refused is not None:
+            self._remove_refused(refused)
         if (message.command == d.MAV_CMD_COMPONENT_ARM_DISARM and self.arming
                 and message.result == d.MAV_RESULT_ACCEPTED):
             self.armed_frame = frame
+
+    def _remove_refused(self, mode: int) -> None:
+        """Remove one command for a mode that the vehicle does not enter by it."""
+        index = next((n for n, each in enumerate(self.modes) if each[0] == mode), None)
+        if index is not None:
+            del self.modes[index]
+        if all(each[0] != mode for each in self.modes):
+            self.sent_at.pop(mode, None)
 
     def take_armed_before(self, frame: int) -> bool:
         """Whether arming was accepted before this frame was sent; True once."""

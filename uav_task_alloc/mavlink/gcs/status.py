@@ -16,6 +16,7 @@ from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
 from uav_task_alloc.mavlink.gcs.link_times import STALE
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
 from uav_task_alloc.mavlink.gcs.suspension_checks import YIELDS
+from uav_task_alloc.mavlink.gcs.two_vehicles import TWO_VEHICLES
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.model import Point
 
@@ -128,6 +129,8 @@ def why_not_available(executor: MissionExecutor, now: float) -> str:
         return telemetry.starting
     if not telemetry.has_position:
         return 'no position yet'
+    if telemetry.two_vehicles.found(now):
+        return f'it waits for {TWO_VEHICLES}'
     if executor.alarm:
         return executor.alarm
     if executor.sender.failing:

@@ -10,6 +10,7 @@ from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessage
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.two_vehicles import TWO_VEHICLES
 
 
 class Takeoff:
@@ -56,18 +57,19 @@ class Takeoff:
             return sender.wait('~/hand_over: it has landed' if self._authority.landed else
                                'a pilot to arm and take off (takeoff is false)')
         if not sender.climbing:
-            why = policy.grounded or self._fence_missing()
+            mixed = TWO_VEHICLES if telemetry.two_vehicles.found(now) else ''
+            why = mixed or policy.grounded or self._fence_missing()
             if why:
                 return sender.wait(why)
             if departure := self._departure():
                 return sender.wait_for(departure)
-            if zone := self._zone_over_home():
+            if zone := self._zone_over_start():
                 return sender.wait(zone)
         return sender.take_off(policy.cruise_altitude, self._wants_to_fly, now)
 
     def _wants_to_fly(self) -> bool:
         stays = (self._held_by() or self._policy().grounded or self._fence_missing()
-                 or self._departure() or self._zone_over_home())
+                 or self._departure() or self._zone_over_start())
         return (self._authority.held and self._onboard.tasks is not None
                 and not (stays and not self._telemetry.airborne)
                 and bool(self._onboard.remaining().stops))
@@ -76,8 +78,11 @@ class Takeoff:
         """The departure that a vehicle on the ground waits for; '': it is due."""
         return self._onboard.list.waits.grounded(self._policy().clock)
 
-    def _zone_over_home(self) -> str:
-        """The zone over its home that it waits for; '': there is none."""
-        home = self._telemetry.home or self._telemetry.position
-        zone = zone_across_path(home, home, self._policy().zones)
-        return '' if zone is None else f'zone {zone.id} to be removed: it covers the home'
+    def _zone_over_start(self) -> str:
+        """The zone over its home, or where it stands, that it waits for; '': there is none."""
+        here, zones = self._telemetry.position, self._policy().zones
+        for place, name in ((self._telemetry.home or here, 'the home'), (here, 'its place')):
+            zone = zone_across_path(place, place, zones)
+            if zone is not None:
+                return f'zone {zone.id} to be removed: it covers {name}'
+        return ''

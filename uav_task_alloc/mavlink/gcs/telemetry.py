@@ -14,10 +14,12 @@ from uav_task_alloc.mavlink.gcs.boot_clock import BootClock
 from uav_task_alloc.mavlink.gcs.link_times import LinkTimes
 from uav_task_alloc.mavlink.gcs.status_texts import failing_checks
 from uav_task_alloc.mavlink.gcs.telemetry_messages import ESTIMATE, STATE_REPORTS
+from uav_task_alloc.mavlink.gcs.two_vehicles import TwoVehicles
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
 
+DISARM_PAUSE = 3.0  # [s] after a disarming in which a fall shows, and nothing is armed
 _IN_MISSION = 1  # MISSION_CURRENT.mission_mode; 0: not known
 _NOT_FLOWN = {d.MISSION_STATE_NOT_STARTED, d.MISSION_STATE_PAUSED}  # ArduPilot sends the first
 _ORDERED = 5.0  # [s] in which the numbers of two frames order them
@@ -42,7 +44,7 @@ class Telemetry:
 
     def __init__(self, profile: Profile, origin: Origin, now: float) -> None:
         self._profile, self._origin = profile, origin
-        self.link = LinkTimes(now)
+        self.link, self.two_vehicles = LinkTimes(now), TwoVehicles()
         self.position, self.velocity = UNKNOWN, UNKNOWN  # ENU [m], [m/s]
         self.home: Point | None = None  # ENU [m]
         self.position_at = self.positions_at = -math.inf  # [s] valid; any GLOBAL_POSITION_INT
@@ -53,6 +55,7 @@ class Telemetry:
         self.altitude = math.nan  # [m] AMSL
         self._level = BatteryLevel()
         # a PX4 in mission mode flies nothing until it is armed, as after a return
+        self.disarmed_at = -math.inf  # [s] a heartbeat showed it
         self.armed = self.arms_into_mission = self.disarmed_since_mission = False
         self.mode, self.mode_at = ModeFunction.UNKNOWN, -math.inf  # it was set then [s]
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
@@ -94,6 +97,10 @@ class Telemetry:
     def boot_ms(self) -> int:
         """The latest time since boot of the vehicle [ms]."""
         return self._boot_clock.boot_ms
+
+    def clock_forecast(self) -> Callable[[float], float] | None:
+        """`BootClock.forecast` of the vehicle."""
+        return self._boot_clock.forecast()
 
     @property
     def battery(self) -> float:
@@ -251,7 +258,10 @@ class Telemetry:
 
     def _heartbeat(self, message: Message, now: float) -> None:
         self.link.heartbeat_at = now
+        was_armed = self.armed
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
+        if was_armed and not self.armed:
+            self.disarmed_at = now
         mode = self._profile.mode_function(message.custom_mode)
         self.arms_into_mission = (
             mode is ModeFunction.MISSION and self._profile.atomic and not self.armed)
@@ -279,6 +289,7 @@ class Telemetry:
         self.altitude = message.alt * 1e-3
         self.position, self.velocity = self.enu_of(message)
         self.position_at = now
+        self.two_vehicles.receive(self.position, message.time_boot_ms * 1e-3, now)
         start, start_at = self._paced
         if now - start_at >= _PACE_OVER:
             moved = math.dist(self.position, start)

@@ -109,6 +109,21 @@ class VerifiedMission:
         if changed or cleared or now - self.verified_at > READBACK_PERIOD:
             self.items = None  # download before anything else
 
+    def note_foreign(self) -> None:
+        """Note that another station has put the mission on board."""
+        self.is_foreign, self.state = True, MissionState.FOREIGN
+
+    def note_changed(self, now: float) -> None:
+        """Request a download, as the vehicle reports a change that is not of our upload."""
+        if now - self.verified_at >= SETTLE_TIME:
+            self.items = None
+
+    def read_since(self, since: float) -> bool:
+        """Whether it was read at steady time `since` [s] or later; else request a download."""
+        if self.verified_at < since:
+            self.items = None
+        return self.items is not None
+
     def note_readback(self, items: tuple[Item, ...], known: tuple[Item, ...], listed: bool,
                       continues: Callable[[], bool], now: float) -> bool:
         """Take a download that no upload of ours explains.
