@@ -289,7 +289,7 @@ class Watch:
     """Stores the commands that it is to record."""
 
     def __init__(self, authority):
-        self.authority, self.commands = authority, []
+        self.authority, self.commands, self.uploads = authority, [], 0
 
     def record_command(self, message, now):
         self.commands.append(message)

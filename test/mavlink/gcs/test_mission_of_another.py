@@ -185,7 +185,7 @@ def test_it_does_not_take_off_into_a_zone_in_which_it_stands(kind):
     assert 'waits for zone Z to be removed: it covers its place' in bench.notes
 
 
-# two vehicles with one system id behind one address
+# two vehicles with one system id at one address
 
 @BOTH
 def test_of_two_vehicles_with_one_system_id_none_is_armed(kind):

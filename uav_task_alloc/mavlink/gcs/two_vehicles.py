@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds two vehicles with one system id behind one address, by positions that alternate."""
+"""Finds two vehicles with one system id at one address, by positions that alternate."""
 from __future__ import annotations
 
 import math
