@@ -24,6 +24,7 @@ def test_the_public_names_are_these():
         'Objective', 'Plan', 'SOLVERS', 'Separation', 'Task', 'ThreatZone', 'Uav', 'detour',
         'plan']
     assert all(hasattr(uav_task_alloc, name) for name in uav_task_alloc.__all__)
+    assert set(uav_task_alloc.__all__) <= set(dir(uav_task_alloc))
 
 
 @pytest.mark.parametrize('path', sorted(ROOT.glob('launch/*.launch.py')), ids=lambda p: p.name)

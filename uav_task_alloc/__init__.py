@@ -35,3 +35,8 @@ def __getattr__(name: str) -> 'Any':
     if name not in _MODULES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
     return getattr(import_module(f'{__name__}.{_MODULES[name]}'), name)
+
+
+def __dir__() -> 'list[str]':
+    """The public names, also those that are not imported yet."""
+    return sorted({*globals(), *__all__})

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -269,6 +269,12 @@ def _spots(points: _Floats) -> str:
     return ' to '.join(_shown(point) for point in points[::max(1, len(points) - 1)][:2])
 
 
+def _opened(opener: Callable[[Path], Any], path: Path) -> Any:
+    """Open a raster; what it lacks is said by errors, not by warnings."""
+    warnings.simplefilter('ignore')
+    return opener(path)
+
+
 def read_terrain(path: Path, origin: Origin) -> Terrain:
     """Read a GeoTIFF.
 
@@ -289,8 +295,7 @@ def read_terrain(path: Path, origin: Origin) -> Terrain:
         raise TerrainError(f"{path}: reading terrain needs rasterio: expected "
                            "pip install 'uav_task_alloc[terrain]'") from None
     try:
-        with warnings.catch_warnings(), rasterio.open(path) as raster:
-            warnings.simplefilter('ignore')  # what it lacks is said below
+        with warnings.catch_warnings(), _opened(rasterio.open, path) as raster:
             if raster.crs is None:
                 raise TerrainError(f'{path}: it has no projection: expected a GeoTIFF with one')
             if raster.transform.is_identity or raster.transform.is_degenerate:

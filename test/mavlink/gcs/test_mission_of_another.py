@@ -222,3 +222,6 @@ def test_positions_of_a_fast_simulator_or_after_one_reset_are_of_one_vehicle():
     found.receive((0.0, 0.0, 50.0), 10_000.0, 20.0)
     found.receive((1.0, 0.0, 50.0), 10_000.2, 20.2)
     assert not found.found(20.2)
+    for n in range(25):  # late messages of before a reboot
+        found.receive((500.0 * (n % 2), 0.0, 50.0), 3.0 + 0.1 * n, 30.0 + 0.2 * n)
+    assert not found.found(35.0)

@@ -52,6 +52,31 @@ def test_a_vehicle_held_at_a_zone_holds_by_a_list_without_tasks(kind):
 
 
 @BOTH
+def test_without_another_list_a_vehicle_holds_before_a_new_zone_and_returns(kind):
+    bench = flying(kind, 'AEZ')
+    zone = ThreatZone.cylinder('Z', (200.0, 100.0), 40.0)
+    bench.set_policy(zones=(zone,), zones_known=True)
+    never_inside(bench, zone, 150.0)
+    assert 'held for 30 s for a list around a zone: returns' in bench.notes
+    assert not bench.vehicles[1].flight.armed
+    assert bench.hand_over() == ''
+    bench.run(limit=20.0)
+    assert not bench.vehicles[1].flight.armed
+    assert 'waits for another list: a zone is across this one' in bench.notes
+    bench.set_policy(zones=())
+    assert bench.run(lambda: bench.completed()[-1:] == ['Z'], 300.0)
+
+
+@BOTH
+def test_a_list_that_came_after_a_zone_is_flown_as_it_is(kind):
+    bench = flying(kind, 'AEZ')
+    zone = ThreatZone.cylinder('Z', (200.0, 100.0), 40.0)
+    bench.set_policy(zones=(zone,), zones_known=True)
+    bench.assign(task_list('AEZ', 2))
+    assert bench.run(lambda: bench.completed()[-1:] == ['Z'], 200.0)
+
+
+@BOTH
 def test_a_vehicle_held_at_a_zone_for_an_upload_that_does_not_end_returns(kind):
     bench, zone = held_at_zone(kind)
     held_at = bench.now

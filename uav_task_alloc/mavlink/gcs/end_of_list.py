@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import TaskList, all_alike
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
+from uav_task_alloc.model import ThreatZone
 
 _MAX_HOLD = 30.0  # [s] of a hold for an upload
 
@@ -40,6 +41,9 @@ class EndOfList:
         self.alarm = ''  # condition that requires action by a human; '': none
         # the last item was set as current: its seq on the wire, since when [s], acknowledged
         self._end_set: tuple[int, float, bool] | None = None
+        # the list that was not flown for a zone, with the zones then
+        self._given_up: tuple[TaskList | None, tuple[ThreatZone, ...]] | None = None
+        self.held_at_zone: Callable[[], bool] = lambda: False  # set by the executor
         self._stays = False  # it was, since the mission was reported as complete
 
     def end_hold(self) -> None:
@@ -52,17 +56,27 @@ class EndOfList:
         if since is None or now - since <= _MAX_HOLD or not self._watch.authority.held:
             return None
         self._watch.replacing_since = None
+        awaited = 'an upload that does not end'
+        if self.held_at_zone() and self._onboard.verified():  # the zone is newer
+            awaited, self._given_up = 'a list around a zone', self._list_and_zones()
         blocked = self._blocked_home()
         if blocked:
-            self.alarm = f'held for an upload that does not end, and {blocked}: stays'
+            self.alarm = f'held for {awaited}, and {blocked}: stays'
             self._notes.append(OperatorNote('error', self.alarm))
             return None
-        self._notes.append(
-            OperatorNote(
-                'error', f'held for {_MAX_HOLD:g} s for an upload that does not end: returns'
-            )
-        )
+        text = f'held for {_MAX_HOLD:g} s for {awaited}: returns'
+        self._notes.append(OperatorNote('error', text))
         return self._sender.set_mode(ModeFunction.RETURN, now)
+
+    def _list_and_zones(self) -> tuple[TaskList | None, tuple[ThreatZone, ...]]:
+        return self._onboard.tasks, self._policy().zones
+
+    def given_up(self, now: float) -> NextMessages:
+        """Do not fly a list again from which a zone made it return, while both are the same."""
+        if self._given_up is None or self._given_up != self._list_and_zones():
+            self._given_up = None
+            return None
+        return self._sender.wait('another list: a zone is across this one')
 
     def empty(self, now: float) -> NextMessages:
         """With an empty list, hold or return, and keep the onboard mission; None: it has tasks."""

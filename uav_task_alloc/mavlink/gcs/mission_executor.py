@@ -97,6 +97,7 @@ class MissionExecutor:
                                   self._end_of_list, log)
         self.holds = HoldRule(self.sender, self.telemetry, self.watch, profile, self.onboard,
                               execution.update_mission, self.notes)
+        self._end_of_list.held_at_zone = lambda: self.holds.at_zone
         restore_record(record, self.onboard, self.watch, profile)
         self.sender.climbing = self.watch.continues_climb
         progress = self.onboard.progress
@@ -116,8 +117,8 @@ class MissionExecutor:
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
             self.holds.hold, transfers.upload, transfers.read, self._has_list, transfers.resume,
             self._may_act, self._hold_first, self._end_of_list.held_too_long, self.holds.stay,
-            self._end_of_list.empty, self.fence.clear_way, execution.update_mission,
-            takeoff.take_off, execution.fly)
+            self._end_of_list.empty, self._end_of_list.given_up, self.fence.clear_way,
+            execution.update_mission, takeoff.take_off, execution.fly)
 
     @property
     def going_home(self) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
@@ -19,8 +19,9 @@ from uav_task_alloc.mavlink.gcs.hand_over import REST_SPEED
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.zone_ahead import ZoneAhead
+from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
-from uav_task_alloc.model import Point
+from uav_task_alloc.model import Point, ThreatZone
 
 _ZONE = 'zone'
 
@@ -58,6 +59,8 @@ class HoldRule:
         self._ordered_at: Point | None = None  # [m] where it was when the hold was ordered
         self._reported = False  # where it came to rest
         self._logged = ''  # why HOLD is not sent
+        self._list: TaskList | None = None
+        self._known: list[ThreatZone] = []  # without their margins, when that list came
         self._zone_ahead = ZoneAhead(telemetry, onboard, profile)
         onboard.upload.may_end = self._zone_ahead.may_take_upload
 
@@ -93,7 +96,7 @@ class HoldRule:
         self._guard(now)
         if not self._requests or not self._telemetry.airborne or self._sender.climbing:
             return None
-        if not self._at_zone:
+        if not self.at_zone:
             self._watch.replacing_since = None  # it holds for longer than an upload takes
         elif self._watch.replacing_since is None and self._watch.authority.held:
             self._watch.replacing_since = now
@@ -112,18 +115,26 @@ class HoldRule:
             return []
         return self._sender.set_mode(ModeFunction.HOLD, now)
 
+    def _note_zones(self) -> None:
+        """Note the zones that were known when the list came: it was made for them."""
+        tasks = self._onboard.tasks
+        if tasks != self._list:
+            self._list = tasks
+            self._known = [replace(zone, margin=0.0) for zone in self._onboard.list.zones()]
+
     @property
-    def _at_zone(self) -> bool:
+    def at_zone(self) -> bool:
         """Whether only a zone on its way holds it."""
         return self._requests.keys() == {_ZONE}
 
     def _guard(self, now: float) -> None:
-        """Hold before a zone to which the mission on board leads, until it has the list."""
+        """Hold before a zone to which the mission on board leads, until a list is around it."""
+        self._note_zones()
         held, mode = _ZONE in self._requests, self._telemetry.mode
         may_fly = self._telemetry.airborne and self._watch.authority.held and (
             mode is ModeFunction.MISSION or (held and mode is ModeFunction.HOLD))
         zone = self._zone_ahead.on_board(held) if may_fly else None
-        if zone is None or self._onboard.verified():
+        if zone is None or (zone in self._known and self._onboard.verified()):
             self._end(_ZONE)
         elif not held and ModeFunction.HOLD in self._profile.set_mode and not (
                 self._profile.rules.loiters):
@@ -135,7 +146,7 @@ class HoldRule:
         if not self._requests or self._sender.climbing:
             return None
         stops = self._onboard.remaining().stops
-        if self._at_zone and not stops:
+        if self.at_zone and not stops:
             return None  # it holds, waits or returns by its list
         out = self._update_mission(now) if stops else None
         if out is not None:

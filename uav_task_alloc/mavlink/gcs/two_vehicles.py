@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 
 from uav_task_alloc.model import Point
 
 _SPREAD, _FASTEST = 30.0, 60.0  # [m], and [m/s], by which one vehicle moves at most
-_JUMPS, _WITHIN = 4, 5.0  # so many in so many [s]: an estimate that is reset jumps once
+# [s] without a longer gap, for so long: late messages of before a reboot come for 5 s at most
+_GAP, _LONG = 1.5, 7.0
 _KEPT = 30.0  # [s] since the last of them
 TWO_VEHICLES = 'a system id of its own: positions of two vehicles come with it'
 
@@ -18,8 +18,8 @@ class TwoVehicles:
 
     def __init__(self) -> None:
         self._last: tuple[Point, float] | None = None  # position [m] ENU, vehicle time [s]
-        self._jumps: deque[float] = deque(maxlen=_JUMPS)
-        self._found_at = -math.inf
+        # [s] of the latest jump, of the first without a gap, and of the latest that shows two
+        self._jumped_at = self._since = self._found_at = -math.inf
 
     def receive(self, position: Point, t: float, now: float) -> None:
         """Take a position.
@@ -33,8 +33,10 @@ class TwoVehicles:
         if last is None or math.dist(position, last[0]) <= (
                 _SPREAD + _FASTEST * max(0.0, t - last[1])):
             return
-        self._jumps.append(now)
-        if len(self._jumps) == _JUMPS and now - self._jumps[0] <= _WITHIN:
+        if now - self._jumped_at > _GAP:
+            self._since = now
+        self._jumped_at = now
+        if now - self._since >= _LONG:
             self._found_at = now
 
     def found(self, now: float) -> bool:
