@@ -259,3 +259,67 @@ def test_a_zone_across_a_detour_changes_the_list_though_the_straight_way_is_clea
     driver.settle(1.0)
     way = (0.0, 0.0, 50.0), *driver.lists['u0'].stops[0].leg.via, (1000.0, 0.0, 50.0)
     assert path_is_clear(way, [moved])
+
+
+WALL = ThreatZone.polygon('wall', ((250.0, -300.0), (270.0, -300.0), (270.0, 300.0),
+                                   (250.0, 300.0)), -100.0, 1000.0)
+
+
+def switched_off(driver, place, available):
+    """What is left of the list of a UAV at a place that may have no tasks any more."""
+    if available:
+        driver.world.set_available('a', False, driver.now)
+    driver.uav('a', *place, home=HOME, available=available)
+    driver.settle()
+    each = driver.lists['a']
+    assert each.stops == ()
+    return each
+
+
+def way_home(each, place):
+    return [place, *each.end_via, HOME]
+
+
+@pytest.mark.parametrize('available', [True, False])
+@pytest.mark.parametrize('place', [(150.0, 200.0, 50.0), (350.0, 0.0, 50.0)])
+@pytest.mark.parametrize('last', [100, 400])
+def test_a_uav_switched_off_in_flight_returns_from_where_it_is(available, place, last):
+    driver = AllocatorDriver(route_end='home')
+    driver.world.set_zones([WALL], (), driver.now)
+    driver.uav('a', 380.0, 0.0, 50.0, home=HOME)
+    driver.add(('t', last, 0))
+    driver.settle()
+    each = switched_off(driver, place, available)
+    assert each.returns
+    assert path_is_clear(way_home(each, place), [WALL])
+    put(driver)  # a way home that is flown stays where nothing cuts it
+    assert driver.lists['a'] == each
+
+
+def test_a_uav_switched_off_in_flight_returns_around_a_zone_that_appears():
+    driver = AllocatorDriver(route_end='home')
+    driver.uav('a', 380.0, 0.0, 50.0, home=HOME)
+    driver.add(('t', 400, 0))
+    driver.settle()
+    place = (350.0, 0.0, 50.0)
+    assert not path_is_clear(way_home(switched_off(driver, place, True), place), [WALL])
+    put(driver, WALL)
+    each = driver.lists['a']
+    assert each.returns
+    assert path_is_clear(way_home(each, place), [WALL])
+
+
+def test_a_uav_that_is_not_known_has_no_way_home():
+    driver = AllocatorDriver(route_end='home')
+    driver.uav('a', 380.0, 0.0, 50.0, home=HOME)
+    driver.add(('t', 400, 0))
+    driver.settle()
+    assert driver.lists['a'].returns
+    driver.world.fleet.forget('a')
+    driver.world.request_replan('test', driver.now)
+    driver.settle()
+    each = driver.lists['a']
+    assert (each.stops, each.returns, each.end_via) == ((), False, ())
+    driver.uav('a', 380.0, 0.0, 50.0, home=HOME)
+    driver.settle()
+    assert driver.lists['a'].returns

@@ -251,7 +251,7 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
     # unknown UAVs, too: one that returns must not fly what others have
     for uav_id in world.lists_in_force():
         if uav_id not in built.lists and not world.restart_hold:
-            _build_empty(world, built, uav_id)
+            _build_empty(world, built, uav_id, stamp)
     return built
 
 
@@ -285,23 +285,24 @@ def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], 
     return unreachable
 
 
-def _build_empty(world: World, built: BuiltLists, uav_id: str) -> None:
-    """Build an empty list: its end is kept, without a safe path home it ends with HOLD.
+def _build_empty(world: World, built: BuiltLists, uav_id: str, stamp: float) -> None:
+    """Build an empty list, which leads home from where the UAV is now if the one before returned.
 
-    With a low battery, for another one, or by order it returns home.
+    Without a safe path home, or where it is not known where the UAV is, it ends with HOLD. With a
+    low battery, for another one, or by order it returns home.
     """
     record, published = world.uav_record(uav_id), world.list_of(uav_id)
-    if record is not None and (record.low or record.awaits_battery
-                               or world.orders.returns(uav_id)):
-        _build(world, built, uav_id, (), True, {})
-        return
-    empty = replace(published, stops=(), distance=0.0)
-    if record is not None and published.returns and world.paths().leg(
-            record.report.position, record.home) is None:
-        empty = replace(empty, returns=False, end_via=())
-        if not record.blocked_on_ground:
-            built.paths_home[uav_id] = False, record.report.position
-    built.lists[uav_id] = empty
+    sent_home = record is not None and (record.low or record.awaits_battery
+                                        or world.orders.returns(uav_id))
+    if record is not None and (sent_home or published.returns):
+        _build(world, built, uav_id, (), True, {}, stamp)
+        if record.blocked_on_ground and not sent_home:
+            del built.paths_home[uav_id]
+    elif published.stops:  # where a way home began, the UAV may never be
+        built.lists[uav_id] = replace(published, stops=(), distance=0.0, returns=False,
+                                      end_via=())
+    else:
+        built.lists[uav_id] = published
 
 
 def _present_routes(world: World, chosen: Plan) -> TaskIdsByUav:
