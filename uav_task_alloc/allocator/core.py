@@ -190,9 +190,10 @@ class Allocator:
         lists = {each.uav: built.lists[each.uav] for each in proposal.lists
                  if each.uav in built.lists}
         left_out = {**self._publisher.left_out, **built.left_out}
+        later = {uav_id: trips for uav_id, trips in self.world.later.items()
+                 if uav_id not in lists} | proposal.later
         self._publisher.put(
-            replace(built, lists=lists, left_out=left_out, later=self.world.later), chosen, now,
-            stamp)
+            replace(built, lists=lists, left_out=left_out, later=later), chosen, now, stamp)
         self._publisher.allocate(chosen, f'plan {proposal.revision} accepted by '
                                  f'{operator or "its deadline"}', stamp)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.list_records import LaterTrips, UavList
 from uav_task_alloc.allocator.order_records import OperatorHold, OrderRows
 from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point
@@ -189,6 +189,7 @@ class Proposal:
     distance: float = 0.0  # [m] that the routes get longer
     finish: float = 0.0  # [s] that the last UAV ends later
     late: tuple[str, ...] = ()  # ids of tasks that are too late with it
+    later: LaterTrips = field(default_factory=dict)  # of the UAVs of the lists
 
 
 @dataclass(frozen=True, slots=True)

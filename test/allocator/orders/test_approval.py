@@ -5,7 +5,8 @@ from allocation import AllocatorDriver
 
 from uav_task_alloc import plan
 from uav_task_alloc.allocator.persistence.restore import restored_state
-from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.allocator.records import AnnouncementAction
+from uav_task_alloc.model import Task, ThreatZone
 
 
 def make(approval, saved=None, **more):
@@ -199,3 +200,93 @@ def test_without_approval_an_open_proposal_goes_out(driver):
     driver.settle()
     assert driver.route('a') == ('t1', 't2', 't4')
     assert driver.world.proposal is None
+
+
+def with_trips(approval, **more):
+    """Two UAVs in flight whose batteries may be changed."""
+    driver = AllocatorDriver(None, plan, approval=approval, trips=2, uav_timeout=3600.0,
+                             approval_timeout=1e4,
+                             **{'route_end': 'home', 'objective': 'balanced', **more})
+    report(driver)
+    return driver
+
+
+def report(driver, metres=8000.0):
+    for uav_id, x in (('a', 0.0), ('b', 1000.0)):
+        driver.uav(uav_id, x, 0.0, 50.0, home=(x, 0.0, 0.0), range=metres, full_range=metres,
+                   endurance=900.0, battery=0.9, turnaround=60.0, climb_speed=2.5,
+                   descent_speed=1.5, mode='ON_MISSION', authority='HELD',
+                   active_task=(driver.world.list_of(uav_id).task_ids or ('',))[0])
+
+
+def add(driver, *places, allowed=None):
+    driver.add(*(Task(name, (x, 60.0, 50.0), allowed_uavs=allowed) for name, x in places))
+    driver.settle(report=False)
+
+
+def add_two_trips(driver):
+    """Two tasks of which the battery of the only UAV that may fly them carries one."""
+    report(driver, 1000.0)
+    add(driver, ('t1', 350.0), ('t2', -350.0), allowed=frozenset({'a'}))
+
+
+def routes(driver):
+    return {uav_id: each.task_ids for uav_id, each in driver.world.lists_in_force().items()}
+
+
+@pytest.mark.parametrize(('approval', 'at_once'), [('all', {}), ('replan', {'b': ('t3',)})])
+def test_with_several_trips_a_plan_waits_too(approval, at_once):
+    driver = with_trips(approval)
+    add(driver, ('t1', 200.0))
+    if approval == 'all':
+        assert routes(driver) == {}
+        decide(driver, accept=True)
+    report(driver)
+    add(driver, ('t2', 400.0), ('t3', 900.0))
+    assert routes(driver) == {'a': ('t1',), **at_once}
+    proposal = driver.world.proposal
+    assert {'a': ('t1', 't2'), 'b': ('t3',)}.items() >= {
+        each.uav: each.task_ids for each in proposal.lists}.items()
+    assert (driver.state('t2'), driver.reason('t2')) == (
+        'UNASSIGNED', f'waits for the approval of plan {proposal.revision}')
+    decide(driver, accept=False)
+    assert routes(driver) == {'a': ('t1',), **at_once}
+
+
+def test_with_several_trips_no_task_is_on_two_uavs_while_a_plan_waits():
+    driver = with_trips('replan', objective='finish', route_end='hold', locked_tasks=0)
+    add(driver, ('t1', 200.0))
+    report(driver)
+    driver.add(Task('t1', (950.0, 60.0, 50.0)), action=AnnouncementAction.UPDATE)
+    driver.settle(report=False)
+    assert routes(driver) == {'a': ('t1',)}
+    assert {each.uav: each.task_ids for each in driver.world.proposal.lists} == {
+        'a': (), 'b': ('t1',)}
+
+
+def test_later_trips_of_a_plan_wait_with_its_lists():
+    driver = with_trips('all', route_end='hold')
+    add_two_trips(driver)
+    proposal = driver.world.proposal
+    (last,), = proposal.later['a']
+    assert (driver.world.later, driver.state(last)) == ({}, 'UNASSIGNED')
+    driver.core.nothing_written()
+    assert restored_state(driver.core.rows()).proposal == proposal
+    decide(driver, accept=True)
+    assert driver.world.later == proposal.later
+    assert (driver.state(last), driver.reason(last)) == (
+        'ASSIGNED', 'after battery change 1 of a')
+
+
+def test_uavs_that_wait_for_a_plan_keep_their_later_trips():
+    driver = with_trips('all', route_end='hold')
+    add_two_trips(driver)
+    decide(driver, accept=True)
+    before = routes(driver), driver.world.later
+    assert before[1]
+    report(driver, 1000.0)
+    add(driver, ('t3', 0.0))
+    assert driver.world.proposal is not None
+    assert (routes(driver), driver.world.later) == before
+    decide(driver, accept=False)
+    assert (routes(driver), driver.world.later) == before

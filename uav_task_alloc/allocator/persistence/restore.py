@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Any, TypeVar
 
 from uav_task_alloc.actions import Action
-from uav_task_alloc.allocator.list_records import ListStop, UavList
+from uav_task_alloc.allocator.list_records import LaterTrips, ListStop, UavList
 from uav_task_alloc.allocator.persistence.order_rows import restore_order_row
 from uav_task_alloc.allocator.records import Proposal, SavedState, TaskRecord, TaskState
 from uav_task_alloc.allocator.state.seen_tasks import restored_block
@@ -156,6 +156,8 @@ def _plain(value: Any) -> Any:
         return value
     if isinstance(value, (list, tuple)):
         return [_plain(v) for v in value]
+    if isinstance(value, dict):
+        return {name: _plain(v) for name, v in value.items()}
     if isinstance(value, frozenset):
         return sorted(value)
     if isinstance(value, Enum):
@@ -234,7 +236,8 @@ def _proposal(body: dict[str, Any]) -> Proposal:
     proposal = Proposal(**{**body, 'lists': lists,
                            'changes': tuple(map(str, _list_of('changes', body['changes']))),
                            'late': tuple(map(str, _list_of('late', body['late']))),
-                           'trigger': str(body['trigger'])})
+                           'trigger': str(body['trigger']),
+                           'later': _later_trips(body.get('later', {}))})
     for name in ('revision', 'base_revision'):
         _whole_number(name, body[name])
     for name in ('stamp', 'deadline', 'distance', 'finish'):
@@ -242,6 +245,12 @@ def _proposal(body: dict[str, Any]) -> Proposal:
     if type(proposal.accepted_on_timeout) is not bool or not lists:
         raise InvalidValue('proposal', body, 'lists, and accepted_on_timeout true or false')
     return proposal
+
+
+def _later_trips(body: dict[str, Any]) -> LaterTrips:
+    return {_uav_id(uav_id): tuple(tuple(map(str, _list_of('trip', trip)))
+                                   for trip in _list_of('later', trips))
+            for uav_id, trips in body.items()}
 
 
 def _leg(body: dict[str, Any]) -> Leg:

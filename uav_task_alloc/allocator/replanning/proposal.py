@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
-from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.list_records import LaterTrips, UavList
 from uav_task_alloc.allocator.records import Proposal
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
@@ -64,10 +65,54 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
         return SplitPlan(built, text, None)
     routes = {**after, **{uav_id: before.get(uav_id, ()) for uav_id in held}}
     proposal = _proposal(world, chosen, built, held, before, trigger, stamp)
-    now = _held(world, build_lists(world, replace(chosen, routes=routes), stamp), stamp)
-    waiting = {task_id for uav_id in held for task_id in after.get(uav_id, ())} - {
+    at_once = _plan_at_once(world, chosen, built, proposal, routes)
+    now = _held(world, build_lists(world, at_once, stamp), stamp)
+    waiting = set(_tasks_of(proposal)) - {
         task_id for task_ids in before.values() for task_id in task_ids}
     return SplitPlan(now, text, proposal, frozenset(waiting))
+
+
+def _tasks_of(proposal: Proposal) -> Iterator[str]:
+    """The tasks of its lists, and of the later trips of their UAVs."""
+    for each in proposal.lists:
+        yield from each.task_ids
+    for trips in proposal.later.values():
+        yield from chain(*trips)
+
+
+def _plan_at_once(world: World, chosen: Plan, built: BuiltLists, proposal: Proposal,
+                  routes: TaskIdsByUav) -> Plan:
+    """A plan in which the UAVs of a proposal keep their lists and their later trips.
+
+    routes: of the lists that go out at once, and those in force of the UAVs that wait.
+    """
+    held = [world.list_of(each.uav) for each in proposal.lists]
+    mine = {task_id for each in held for task_id in each.task_ids}
+    later = _later_at_once(world, built, proposal, routes)
+    trips = {uav_id: (task_ids if world.usable(uav_id) else (), *later.get(uav_id, ()))
+             for uav_id, task_ids in routes.items()}
+    first = {**chosen.routes, **{uav_id: rows[0] for uav_id, rows in chosen.trips.items()}}
+    return replace(
+        chosen, routes=routes, timetable=lambda: replace(chosen.timetable(), trips=trips),
+        legs={uav_id: legs for uav_id, legs in chosen.legs.items()
+              if first.get(uav_id) == routes.get(uav_id)},
+        reversed=(chosen.reversed - mine) | {
+            stop.task.id for each in held for stop in each.stops if stop.reversed})
+
+
+def _later_at_once(world: World, built: BuiltLists, proposal: Proposal,
+                   routes: TaskIdsByUav) -> LaterTrips:
+    """The later trips with such a plan: those in force first; no task is planned twice."""
+    waits = {each.uav: each.task_ids for each in proposal.lists}
+    planned, later = {*chain(*routes.values(), *waits.values())}, LaterTrips()
+    for uav_id in (*waits, *(each for each in built.later if each not in waits)):
+        source = world.later if uav_id in waits else built.later
+        rows = [[task_id for task_id in trip if task_id not in planned
+                 and world.can_fly(uav_id, task_id)] for trip in source.get(uav_id, ())]
+        planned.update(chain(*rows))
+        if any(rows):
+            later[uav_id] = tuple(tuple(row) for row in rows if row)
+    return later
 
 
 def _held(world: World, built: BuiltLists, stamp: float) -> BuiltLists:
@@ -146,7 +191,8 @@ def _proposal(world: World, chosen: Plan, built: BuiltLists, held: Iterable[str]
     params = world.params
     return Proposal(0, world.revision, tuple(new.values()), trigger, stamp,
                     stamp + params.approval_timeout, params.approval_on_timeout == 'accept',
-                    tuple(changes), distance, finish, tuple(sorted(late)))
+                    tuple(changes), distance, finish, tuple(sorted(late)),
+                    {uav_id: built.later[uav_id] for uav_id in new if uav_id in built.later})
 
 
 def _change(uav_id: str, before: tuple[str, ...], after: tuple[str, ...],
