@@ -34,6 +34,7 @@ class ReplanProblem:
     since: Mapping[str, float] = field(default_factory=dict)  # [s] announcements, by task id
     stop_time: float = 0.0  # [s] that braking and accelerating cost at each task
     outlook: FleetOutlook | None = None  # None: the next tasks do not count
+    too_high: Mapping[str, str] = field(default_factory=dict)  # for which UAVs; by task id
 
 
 @dataclass(frozen=True, slots=True)

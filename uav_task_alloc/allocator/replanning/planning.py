@@ -15,6 +15,10 @@ from uav_task_alloc.allocator.replanning.from_now import (
     objective_of,
     separation_of,
 )
+from uav_task_alloc.allocator.replanning.height_limits import (
+    with_height_limits,
+    with_height_reasons,
+)
 from uav_task_alloc.allocator.replanning.held_deadlines import (
     relaxed_tasks,
     with_deadlines_held,
@@ -23,7 +27,6 @@ from uav_task_alloc.allocator.replanning.held_deadlines import (
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, repaired_routes
 from uav_task_alloc.allocator.replanning.task_lists import LegKey, build_task_list, planned_legs
 from uav_task_alloc.allocator.replanning.trips import present_trips, waiting_uavs, with_later_trips
-from uav_task_alloc.allocator.state.flights import top_of
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.stop_times import way_ahead
@@ -66,14 +69,12 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
     params, uavs, tasks = world.params, tuple(map(world.uav, world.fleet.usable_ids())), \
         world.tasks_to_plan()
     objective, records = objective_of(params), world.task_records()
-    stop_time, waiting = 0.0, dict[str, Uav]()
+    stop_time, locked, too_high = 0.0, world.locked_tasks(), dict[str, str]()
     if counts_time(uavs, tasks, objective, params.trips):
         uavs = tuple(measured_uav(world, uav) for uav in uavs)
-        waiting = waiting_uavs(world, stamp)
-        top = max(map(top_of, tasks), default=-math.inf)
-        uavs = tuple(world.flights.spendable(uav, top) for uav in uavs)
-        waiting = {uav_id: world.flights.spendable(uav, top) for uav_id, uav in waiting.items()}
-        uavs += tuple(uav for uav_id, uav in waiting.items() if not world.usable(uav_id))
+        uavs += tuple(uav for uav_id, uav in waiting_uavs(world, stamp).items()
+                      if not world.usable(uav_id))
+        uavs, tasks, too_high = with_height_limits(world, uavs, tasks, locked, stamp)
         stop_time = world.flights.stop_time
         tasks = relaxed_tasks(world, tasks, (uav.id for uav in uavs), stamp)
     published = {uav.id: world.list_of(uav.id) for uav in uavs}
@@ -85,13 +86,14 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
     return ReplanProblem(
         world.version, trigger, background,
         params.background_budget if background else params.solve_budget, uavs,
-        tasks, tuple(world.zones.values()), world.locked_tasks(),
+        tasks, tuple(world.zones.values()), locked,
         published=with_later_trips(replace(best, routes=routes, legs=legs, reversed=frozenset(
             stop.task.id for each in published.values() for stop in each.stops
             if stop.reversed and stop.task.id not in under_way)), world),
         warm=replace(best, reversed=best.reversed - under_way.keys()),
         objective=objective, trips=params.trips, stamp=stamp, stop_time=stop_time,
-        since={task.id: records[task.id].since for task in tasks}, outlook=outlook)
+        since={task.id: records[task.id].since for task in tasks}, outlook=outlook,
+        too_high=too_high)
 
 
 def ways_under_way(world: World) -> dict[str, tuple[Point, ...]]:
@@ -208,12 +210,13 @@ def repaired_plan(plan: Callable[..., Plan], problem: ReplanProblem, params: All
 def _solved(plan: Callable[..., Plan], problem: ReplanProblem, params: AllocatorParams,
             stop: Callable[[], bool], warm: Plan, max_iterations: int | None,
             tasks: Sequence[Task]) -> Plan:
-    return plan(problem.uavs, tasks, problem.zones, budget=problem.budget,
-                seed=params.seed, warm=warm, route_end=params.route_end,
-                locked=problem.locked, clearance=params.clearance,
-                altitude_min=params.altitude_min, altitude_max=params.altitude_max,
-                threads=params.threads, objective=problem.objective, stop=stop,
-                trips=problem.trips, max_iterations=max_iterations)
+    found = plan(problem.uavs, tasks, problem.zones, budget=problem.budget,
+                 seed=params.seed, warm=warm, route_end=params.route_end,
+                 locked=problem.locked, clearance=params.clearance,
+                 altitude_min=params.altitude_min, altitude_max=params.altitude_max,
+                 threads=params.threads, objective=problem.objective, stop=stop,
+                 trips=problem.trips, max_iterations=max_iterations)
+    return with_height_reasons(found, problem.too_high, tasks)
 
 
 def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
