@@ -15,11 +15,12 @@ from uav_task_alloc.allocator.persistence import unsaved_rows
 from uav_task_alloc.allocator.plan_publisher import PlanPublisher
 from uav_task_alloc.allocator.records import Outbox, SavedState
 from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
+from uav_task_alloc.allocator.replanning.accepted_lists import accepted_lists, plan_of_lists
 from uav_task_alloc.allocator.replanning.battery_changes import BatteryChanges
 from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
-from uav_task_alloc.allocator.replanning.planning import build_lists, replan_problem
+from uav_task_alloc.allocator.replanning.planning import replan_problem
 from uav_task_alloc.allocator.replanning.proposal import Approvals, holding_plan, split_plan
 from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
@@ -171,31 +172,37 @@ class Allocator:
         elif self.approvals.expired(stamp):
             self.decide(proposal.accepted_on_timeout, '', now, stamp)
 
-    def decide(self, accept: bool, operator: str, now: float, stamp: float) -> None:
+    def decide(self, accept: bool, operator: str, now: float, stamp: float) -> str:
         """Accept or reject the open proposal.
 
         Args:
             accept: put it in force.
             operator: who decides; '' for the deadline.
             now, stamp: see the class.
+
+        Returns:
+            Why it cannot be put in force any more; '' otherwise. It is withdrawn then, but not
+            in the seconds after a restart in which no task changes its UAV.
         """
-        proposal = self.world.proposal
+        world, proposal = self.world, self.world.proposal
         assert proposal is not None
         if not accept:
             self.approvals.reject(operator)
-            self.world.request_replan(f'plan {proposal.revision} rejected', now)
-            return
-        chosen = self.approvals.accepted(operator)
-        built = build_lists(self.world, chosen, stamp)
-        lists = {each.uav: built.lists[each.uav] for each in proposal.lists
-                 if each.uav in built.lists}
-        left_out = {**self._publisher.left_out, **built.left_out}
-        later = {uav_id: trips for uav_id, trips in self.world.later.items()
-                 if uav_id not in lists} | proposal.later
-        self._publisher.put(
-            replace(built, lists=lists, left_out=left_out, later=later), chosen, now, stamp)
+            world.request_replan(f'plan {proposal.revision} rejected', now)
+            return ''
+        built, why = accepted_lists(world, proposal, stamp)
+        if why:
+            if not world.restart_hold:
+                self.approvals.withdraw(f'it cannot be put in force any more: {why}')
+                world.request_replan(f'plan {proposal.revision} withdrawn', now)
+            return why
+        self.approvals.accept(operator)
+        chosen = plan_of_lists(world, built.lists.values())
+        self._publisher.put(replace(built, left_out={
+            **self._publisher.left_out, **built.left_out}), chosen, now, stamp)
         self._publisher.allocate(chosen, f'plan {proposal.revision} accepted by '
                                  f'{operator or "its deadline"}', stamp)
+        return ''
 
     def due(self, now: float, stamp: float) -> ReplanProblem | None:
         """Return the problem to solve now, if any; None while one is being solved."""

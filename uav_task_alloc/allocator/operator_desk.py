@@ -14,6 +14,7 @@ from uav_task_alloc.allocator.order_requests import (
     RequestCheck,
     refused,
 )
+from uav_task_alloc.allocator.replanning.accepted_lists import accepted_lists
 from uav_task_alloc.allocator.replanning.what_if import (
     OrderChange,
     WhatIfAnswer,
@@ -106,10 +107,15 @@ class OperatorDesk:
         word = 'accepted' if accept else 'rejected'
         text = f'plan {revision} {word}: {first_of(proposal.changes, separator="; ")}'
         price = (proposal.distance, proposal.finish, proposal.late) if accept else (0.0, 0.0, ())
+        before = f'revision {self._world.revision}'
+        if dry_run:
+            why = accepted_lists(self._world, proposal, stamp)[1] if accept else ''
+        else:
+            why = self._core.decide(accept, operator, now, stamp)
+        if why:
+            return refused(f'plan {revision} cannot be put in force now: {why}')
         if dry_run:
             return OrderAnswer(True, f'dry run: {text}', '', *price)
-        before = f'revision {self._world.revision}'
-        self._core.decide(accept, operator, now, stamp)
         entry = self._world.orders.write_log(OrderLogEntry(
             0, stamp, operator, f'plan {revision} {word}', before,
             f'revision {self._world.revision}: {first_of(proposal.changes, separator="; ")}'))

@@ -274,6 +274,7 @@ def test_later_trips_of_a_plan_wait_with_its_lists():
     assert restored_state(driver.core.rows()).proposal == proposal
     decide(driver, accept=True)
     assert driver.world.later == proposal.later
+    assert driver.lists['a'].returns
     assert (driver.state(last), driver.reason(last)) == (
         'ASSIGNED', 'after battery change 1 of a')
 

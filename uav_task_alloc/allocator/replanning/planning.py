@@ -246,7 +246,7 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
         if waits or world.is_current(uav_id, tasks, home, backward):
             built.lists[uav_id] = world.list_of(uav_id)
             continue
-        unreachable = _build(world, built, uav_id, tasks, home, legs, stamp, backward)
+        unreachable = build_list(world, built, uav_id, tasks, home, legs, stamp, backward)
         built.left_out.update(unreachable)
         built.zones_when_built[uav_id] = world.paths(), world.uav_records()[uav_id].home
     for each in world.ordered.sequences(returns).values():
@@ -254,7 +254,7 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
     # unknown UAVs, too: one that returns must not fly what others have
     for uav_id in world.lists_in_force():
         if uav_id not in built.lists and not world.restart_hold:
-            _build_empty(world, built, uav_id, stamp)
+            build_empty_list(world, built, uav_id, stamp)
     return built
 
 
@@ -274,31 +274,52 @@ def way_to_place_is_clear(world: World, each: UavList) -> bool:
         record.report.velocity) is not None
 
 
-def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], returns: bool,
-           legs: Mapping[LegKey, Leg], stamp: float = 0.0,
-           backward: Collection[str] = ()) -> dict[str, str]:
-    """Build the list of a known UAV; returns why it cannot reach tasks, by their ids."""
-    uav = world.uav(uav_id)
-    new, unreachable = build_task_list(uav, tasks, returns, legs, world.list_of(uav_id),
-                                       world.paths(), world.flights.of(uav_id, stamp),
-                                       separation_of(world.params).on, backward)
+def build_list(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], returns: bool,
+               legs: Mapping[LegKey, Leg], stamp: float, backward: Collection[str] = (),
+               approved: UavList | None = None) -> dict[str, str]:
+    """Build the list of a known UAV.
+
+    Args:
+        world: as it is now.
+        built: gets the list.
+        uav_id: of a known UAV.
+        tasks: in the order of flight.
+        returns: whether the list should end with a return home.
+        legs: of the plan, see `planned_legs`.
+        stamp: [s] published clock.
+        backward: ids of the tasks whose paths are flown from the last point.
+        approved: list whose legs and waits are kept; None: those of the list in force.
+
+    Returns:
+        Why it cannot reach tasks, by their ids.
+    """
+    uav, keep = world.uav(uav_id), approved is not None or separation_of(world.params).on
+    new, unreachable = build_task_list(uav, tasks, returns, legs,
+                                       approved or world.list_of(uav_id), world.paths(),
+                                       world.flights.of(uav_id, stamp), keep, backward)
     end = new.stops[-1].exit if new.stops else uav.position
     built.lists[uav_id] = new
     built.paths_home[uav_id] = new.returns or not returns, end
     return unreachable
 
 
-def _build_empty(world: World, built: BuiltLists, uav_id: str, stamp: float) -> None:
+def build_empty_list(world: World, built: BuiltLists, uav_id: str, stamp: float) -> None:
     """Build an empty list, which leads home from where the UAV is now if the one before returned.
 
     Without a safe path home, or where it is not known where the UAV is, it ends with HOLD. With a
     low battery, for another one, or by order it returns home.
+
+    Args:
+        world: as it is now.
+        built: gets the list.
+        uav_id: of a UAV, known or not.
+        stamp: [s] published clock.
     """
     record, published = world.uav_record(uav_id), world.list_of(uav_id)
     sent_home = record is not None and (record.low or record.awaits_battery
                                         or world.orders.returns(uav_id))
     if record is not None and (sent_home or published.returns):
-        _build(world, built, uav_id, (), True, {}, stamp)
+        build_list(world, built, uav_id, (), True, {}, stamp)
         if record.blocked_on_ground and not sent_home:
             del built.paths_home[uav_id]
     elif published.stops:  # where a way home began, the UAV may never be

@@ -16,7 +16,7 @@ from uav_task_alloc.allocator.replanning.planning import BuiltLists, build_lists
 from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import first_of
-from uav_task_alloc.model import Plan
+from uav_task_alloc.model import Plan, Task
 
 _MOST_NAMED = 20  # tasks of one UAV in a sentence
 
@@ -106,6 +106,8 @@ def _later_at_once(world: World, built: BuiltLists, proposal: Proposal,
     waits = {each.uav: each.task_ids for each in proposal.lists}
     planned, later = {*chain(*routes.values(), *waits.values())}, LaterTrips()
     for uav_id in (*waits, *(each for each in built.later if each not in waits)):
+        if world.uav_record(uav_id) is None:
+            continue
         source = world.later if uav_id in waits else built.later
         rows = [[task_id for task_id in trip if task_id not in planned
                  and world.can_fly(uav_id, task_id)] for trip in source.get(uav_id, ())]
@@ -166,11 +168,14 @@ def same_proposal(world: World, one: Proposal, other: Proposal) -> bool:
         world: as it is now.
         one, other: proposals.
     """
-    return _routes(world, one) == _routes(world, other)
+    return _present_stops(world, one) == _present_stops(world, other)
 
 
-def _routes(world: World, proposal: Proposal) -> TaskIdsByUav:
-    return present_routes(world, {each.uav: each for each in proposal.lists})
+def _present_stops(world: World, proposal: Proposal) -> dict[str, list[Task]]:
+    """The tasks of its lists that are still to be flown, as they were announced by then."""
+    routes = present_routes(world, {each.uav: each for each in proposal.lists})
+    return {each.uav: [stop.task for stop in each.stops if stop.task.id in routes[each.uav]]
+            for each in proposal.lists}
 
 
 def _proposal(world: World, chosen: Plan, built: BuiltLists, held: Iterable[str],
@@ -302,14 +307,9 @@ class Approvals:
         self._rejected, self._rejected_version = self._world.proposal, self._world.version + 1
         self._close(f'rejected by {operator}' if operator else 'rejected: its time is over')
 
-    def accepted(self, operator: str) -> Plan:
-        """Close the open proposal; returns its plan, the lists in force for the other UAVs."""
-        world, proposal = self._world, self._world.proposal
-        assert proposal is not None
-        routes = present_routes(world, world.lists_in_force())
-        routes.update((each.uav, each.task_ids) for each in proposal.lists)
+    def accept(self, operator: str) -> None:
+        """Close the open proposal, whose lists are put in force."""
         self._close(f'accepted by {operator}' if operator else 'accepted: its time is over')
-        return Plan(routes, returns=world.params.route_end == 'home')
 
     def expired(self, stamp: float) -> bool:
         """Return whether the time of the open proposal is over."""

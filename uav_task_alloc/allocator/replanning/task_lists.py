@@ -31,6 +31,23 @@ def planned_legs(plan: Plan) -> dict[LegKey, Leg]:
     return legs
 
 
+def legs_of_list(each: UavList) -> dict[LegKey, Leg]:
+    """Return the legs of a list by the stops they connect, as `planned_legs` does.
+
+    Args:
+        each: list of a UAV, which may have flown a part of the first leg.
+
+    Returns:
+        All but the first leg, which begins where the UAV was.
+    """
+    legs = {_leg_key(each.uav, before.task.id, stop.task.id): stop.leg
+            for before, stop in pairwise(each.stops)}
+    if each.returns and each.stops:
+        last = each.stops[-1].task.id
+        legs[_leg_key(each.uav, last, _HOME)] = Leg(each.end_via, 0.0)  # its length is not used
+    return legs
+
+
 def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
                     legs: Mapping[LegKey, Leg], published: UavList,
                     paths: SafePaths,
