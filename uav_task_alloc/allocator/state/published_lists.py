@@ -8,6 +8,7 @@ from dataclasses import replace
 from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.state.flight_pace import UavFlight
 from uav_task_alloc.allocator.state.stop_times import timed_stops
+from uav_task_alloc.piece_ids import split_piece
 
 
 class PublishedLists:
@@ -25,6 +26,7 @@ class PublishedLists:
         # revisions of the previous run, and of another allocator: their tasks are unknown
         self._previous = {each.uav: each.revision for each in self.lists.values()}
         self._foreign_revisions: dict[str, int] = {}
+        self._on_board: dict[str, int] = {}  # UAV -> revision that it reports
         self._known_tasks = set(tasks)
         self._had_tasks: set[str] = set()  # UAVs
         # new UAVs begin above this revision: a forgotten one may return with its list
@@ -73,6 +75,7 @@ class PublishedLists:
         Such a list is of a previous run, or of another allocator.
         """
         published = self.get(uav_id)
+        self._on_board[uav_id] = revision
         if revision <= published.revision:
             return False
         self.foreign = True
@@ -81,14 +84,19 @@ class PublishedLists:
         return True
 
     def contained(self, uav_id: str, task_id: str, revision: int) -> bool:
-        """Return whether that revision of a UAV's list contained a task, as far as is known."""
+        """Return whether that revision of a UAV's list contained a task, as far as is known.
+
+        Another allocator may have given the number of a piece to another way. The bridge compares
+        the ways when it takes a list, and then repeats the event of a piece that was flown.
+        """
         if revision == 0:
             return task_id in self.get(uav_id).task_ids
+        first, last = self._contained.get((uav_id, task_id), (1, 0))
         if revision <= self._foreign_revisions.get(uav_id, 0):
-            return True
+            return not split_piece(task_id)[1] or (
+                last > 0 and self._on_board.get(uav_id, 0) >= first)
         if revision <= self._previous.get(uav_id, 0) and task_id in self._known_tasks:
             return True
-        first, last = self._contained.get((uav_id, task_id), (1, 0))
         return first <= revision <= last
 
     def owners(self) -> dict[str, str]:
@@ -132,6 +140,7 @@ class PublishedLists:
 
     def forget_uav(self, uav_id: str) -> None:
         """Remove a UAV; if it reports again its revisions still increase."""
+        self._on_board.pop(uav_id, None)
         published = self.lists.pop(uav_id, None)
         if published is None:
             return

@@ -117,15 +117,19 @@ class Works:
 
     def cancel(self, task_id: str, stamp: float) -> TaskVerdict:
         """Withdraw all pieces that are not flown."""
+        if self._lacks_pieces(self.records[task_id]):
+            self._recut_one(self.records[task_id], stamp, 'restart')
         known = self.records[task_id]
         state = self.state(known)
         if state is TaskState.CANCELLED:
             return TaskVerdict(task_id, True, UNCHANGED)
         if state is TaskState.COMPLETED:
             return TaskVerdict(task_id, False, 'is COMPLETED: nothing to cancel')
-        for each in known.pieces:
-            if self._tasks.records[each].state is not TaskState.COMPLETED:
-                self._tasks.step(each, TaskTransition.CANCEL, stamp)
+        present = self._present(known)
+        for record in present:
+            if record.state is not TaskState.COMPLETED:
+                self._tasks.step(record.task.id, TaskTransition.CANCEL, stamp)
+        self._put(replace(known, pieces=tuple(record.task.id for record in present)))
         return TaskVerdict(task_id, True)
 
     # cutting again
@@ -203,7 +207,8 @@ class Works:
         """Return whether a task is a piece that was cut again, and may still be flown."""
         whole, piece = split_piece(task_id)
         known = self.records.get(whole)
-        return bool(piece) and known is not None and task_id not in known.pieces
+        return bool(piece) and known is not None and (
+            task_id in self._tasks.records and task_id not in known.pieces)
 
     def flown_after_all(self, task_id: str, uav_id: str, stamp: float) -> bool:
         """Count the way of a replaced piece as flown; the rest is cut without it.

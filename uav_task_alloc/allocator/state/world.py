@@ -86,7 +86,7 @@ class World:
         self.params, self._make_safe_paths, self._on_change = params, make_safe_paths, on_change
         # of the allocation; and the first one with the lists in force
         self.revision = self.plan_revision = saved.revision
-        self.version, self.outbox = 0, Outbox()
+        self.version, self.outbox, self.proposal = 0, Outbox(), saved.proposal
         self.zones = {zone.id: zone for zone in saved.zones}
         self.restart_hold = any(each.stops for each in saved.lists)  # no task changes its UAV
         self.kernels_ready = False  # compiled: checks of zones are fast
@@ -96,8 +96,7 @@ class World:
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
         self.stuck: frozenset[str] = frozenset()  # UAVs that hold for one that holds for them
-        self.tasks = TaskRegistry(saved.tasks)
-        self.orders, self.proposal = Orders(saved.orders), saved.proposal
+        self.tasks, self.orders = TaskRegistry(saved.tasks), Orders(saved.orders)
         self.fleet = Fleet(saved.switched_off, {
             record.uav: record.task.id for record in saved.tasks
             if record.state is TaskState.ACTIVE}, self.orders, saved.change_from)
@@ -113,6 +112,7 @@ class World:
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
         self.ground = Ground(terrain, lambda: tuple(self.zones.values()), lambda: self.params)
         self.works = Works(self.tasks, saved.works, self.ground.cut, self.deadlines.refusal)
+        self.lists.forget_tasks({each.task.id for each in saved.tasks} - {*self.tasks.records})
         seen = SeenTasks(saved.seen_tasks.items(), lambda: self.params.anticipate != 'off')
         self.announced = Announcements(
             self.tasks, self.works, self.deadlines, self.ground, self.note, self.request_replan,
