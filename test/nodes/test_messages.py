@@ -4,13 +4,21 @@ import dataclasses
 import math
 
 import pytest
+from builtin_interfaces.msg import Time
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.allocator.list_records import ListStop
+from uav_task_alloc.allocator.records import TaskState
+from uav_task_alloc.allocator.status import TaskStatus
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Task, ThreatZone
-from uav_task_alloc.nodes.conversions import bridge_messages, messages, orders
+from uav_task_alloc.nodes.conversions import (
+    allocation_messages,
+    bridge_messages,
+    messages,
+    orders,
+)
 from uav_task_alloc.record import message_records
 from uav_task_alloc.separation.monitor import AlertAction, SeparationAlert, SeparationHold
 from uav_task_alloc.zone_codec import decode_zone_message
@@ -103,7 +111,9 @@ def test_a_bad_task_is_refused_by_the_name_of_its_field(changed, text):
     ({'endurance': -5.0}, 'uav u1: endurance = -5.0'),
     ({'payload_capacity': 2e6}, 'uav u1: payload_capacity = 2000000.0'),
     ({'turnaround': -1.0}, 'uav u1: turnaround = -1.0'),
+    ({'cruise_speed': 1e-40}, 'uav u1: cruise_speed = 1e-40: expected a number in'),
     ({'list_revision': 2**32 - 1}, 'uav u1: list_revision = 4294967295'),
+    ({'list_revision': 2**31}, 'uav u1: list_revision = 2147483648'),
 ])
 def test_a_bad_state_is_refused_by_the_name_of_its_field(changed, text):
     state = m.UavState(uav_id='u1', battery=math.nan, range_remaining=math.nan,
@@ -120,6 +130,17 @@ def test_zero_and_nan_limits_of_a_uav_are_unknown_and_others_are_taken():
                                            full_range=5000.0, turnaround=60.0))
     assert (report.endurance, report.climb_speed, report.descent_speed, report.payload_capacity,
             report.full_range, report.turnaround) == (600.0, None, None, None, 5000.0, 60.0)
+
+
+def test_an_expected_start_later_than_a_message_can_hold_is_not_known():
+    for seconds, sec in ((1e42, 0), (2.0**31, 0), (2.0**31 - 1.0, 2**31 - 1), (0.0, 0)):
+        status = TaskStatus('t1', TaskState.ASSIGNED, 'u1', '', 1.0, seconds)
+        assert allocation_messages.from_task_status(status).expected.sec == sec
+
+
+def test_the_last_time_of_a_message_survives():
+    last = m.Task(task_id='t1', value=1.0, earliest=Time(sec=2**31 - 1, nanosec=999_999_999))
+    assert messages.from_task(messages.to_task(last, ORIGIN)).earliest == last.earliest
 
 
 @pytest.mark.parametrize('zone', [

@@ -17,6 +17,7 @@ from uav_task_alloc.model import Plan, Point, Task, ThreatZone
 # limits of a UavReport that are None where they are unknown, named as in model.Uav
 REPORTED_LIMITS = ('endurance', 'payload_capacity', 'climb_speed', 'descent_speed', 'full_range',
               'turnaround')
+_SLOWEST = 0.01  # [m/s] a lower speed is no speed of a vehicle; times would exceed any message
 
 
 class TaskState(Enum):
@@ -122,7 +123,7 @@ class UavReport:
     climb_speed: float | None = None  # [m/s]
     descent_speed: float | None = None  # [m/s]
     full_range: float | None = None  # [m] with a full battery
-    turnaround: float | None = None  # [s] of a battery change at its home
+    turnaround: float | None = None  # [s] of a battery change at its home; inf, no change: None
     mode: str = ''  # name of the constant of UavState; '': unknown
     authority: str = ''  # the same
     foreign: bool = False  # the mission on board is not of its bridge
@@ -147,7 +148,7 @@ class UavReport:
         if self.range is not None:
             check_number(place + 'range_remaining', self.range, 0.0)
         if self.cruise_speed is not None:
-            check_number(place + 'cruise_speed', self.cruise_speed, 0.0, 1e4)
+            check_number(place + 'cruise_speed', self.cruise_speed, _SLOWEST, 1e4)
         if self.velocity is not None:
             put(self, 'velocity', check_point(place + 'velocity', self.velocity))
         if self.battery is not None:
@@ -159,7 +160,10 @@ class UavReport:
         for name in REPORTED_LIMITS:
             if getattr(self, name) is not None:
                 most = 1e6 if name == 'payload_capacity' else math.inf  # as model.Uav
-                check_number(place + name, getattr(self, name), 0.0, most, open_low=True)
+                least = _SLOWEST if name.endswith('_speed') else 0.0
+                check_number(place + name, getattr(self, name), least, most, open_low=not least)
+        if self.turnaround == math.inf:
+            put(self, 'turnaround', None)
         put(self, 'capabilities', check_names(place + 'capabilities', self.capabilities))
 
 

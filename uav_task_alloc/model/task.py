@@ -13,6 +13,7 @@ from uav_task_alloc.geometry.polyline import polyline_length
 
 Point = tuple[float, float, float]  # [m] ENU
 LONG = 4e9  # [s] bound of all finite times; a message holds 2.1e9
+LONGEST_SERVICE = 1e9  # [s] bound of the service time
 _TASK_TIMES = (('earliest', -math.inf, LONG), ('latest', -LONG, math.inf),
                ('release', -LONG, LONG), ('announced', -LONG, LONG))  # [s]
 _TURN = 2.0 * math.pi
@@ -75,7 +76,7 @@ class Task:
         if math.isinf(self.value):
             raise InvalidValue(place + 'value', self.value, 'a finite number')
         put(self, 'service_time', check_number(place + 'service_time', self.service_time, 0.0,
-                                               1e9))
+                                               LONGEST_SERVICE))
         put(self, 'required_capabilities',
             check_names(place + 'required_capabilities', self.required_capabilities))
         if self.allowed_uavs is not None:

@@ -140,7 +140,7 @@ def test_unknown_range_and_speed_are_the_defaults():
 @pytest.mark.parametrize(('change', 'text'), [
     ({'position': (math.nan, 0.0, 0.0)}, 'uav a: position = (nan, 0.0, 0.0): expected three fin'),
     ({'range': -1.0}, 'uav a: range_remaining = -1.0: expected a number in [0, inf]'),
-    ({'cruise_speed': math.inf}, 'uav a: cruise_speed = inf: expected a number in [0, 10000]'),
+    ({'cruise_speed': math.inf}, 'uav a: cruise_speed = inf: expected a number in [0.01, 10000]'),
     ({'home': (0.0, math.inf, 0.0)}, 'uav a: home = (0.0, inf, 0.0)'),
 ])
 def test_a_bad_report_is_refused_in_words(change, text):

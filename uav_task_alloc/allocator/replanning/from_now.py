@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from uav_task_alloc.allocator.replan_records import ReplanProblem
 from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.model.task import LONGEST_SERVICE
 from uav_task_alloc.objective import OBJECTIVES, Objective
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.rule import Separation
@@ -90,4 +91,4 @@ def _from(task: Task, stamp: float, since: float, stop_time: float) -> Task:
     """A task whose service takes the time of braking and accelerating, too."""
     return replace(task, earliest=task.earliest - stamp, latest=task.latest - stamp,
                    release=max(0.0, task.release - stamp), announced=min(0.0, since - stamp),
-                   service_time=task.service_time + stop_time)
+                   service_time=min(LONGEST_SERVICE, task.service_time + stop_time))

@@ -14,6 +14,7 @@ from uav_task_alloc.allocator.list_records import LaterTrips
 from uav_task_alloc.allocator.state.flights import OVERDUE
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan, Uav
+from uav_task_alloc.model.task import LONG
 
 
 def present_trips(chosen: Plan, later_only: Collection[str]) -> tuple[Plan, LaterTrips]:
@@ -90,11 +91,12 @@ def waiting_uavs(world: World, stamp: float) -> dict[str, Uav]:
         flight = world.flights.of(uav_id, stamp)
         landed = stamp + flight.pace.seconds((report.position, record.home)) if (
             since is None and flight) else since or stamp
-        if stamp - landed > OVERDUE * report.turnaround:
+        ready = max(1.0, landed + report.turnaround - stamp)
+        if stamp - landed > OVERDUE * report.turnaround or ready > LONG:
             continue
         uav = world.uav(uav_id)
         found[uav_id] = replace(
             uav, position=record.home, range=uav.full_range or 0.0,
             endurance=math.inf if uav.full_endurance is None else uav.full_endurance,
-            available_from=max(1.0, landed + report.turnaround - stamp))
+            available_from=ready)
     return found

@@ -8,7 +8,10 @@ from dataclasses import replace
 from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.state.flight_pace import UavFlight
 from uav_task_alloc.allocator.state.stop_times import timed_stops
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.piece_ids import split_piece
+
+_MOST_FOREIGN = 2**30  # revision of another allocator: this one goes on from it to 2**31 - 1
 
 
 class PublishedLists:
@@ -68,6 +71,20 @@ class PublishedLists:
             first, _ = self._contained.get((new.uav, task_id), (revised.revision, 0))
             self._contained[new.uav, task_id] = (first, revised.revision)
         return revised
+
+    def check_revision(self, uav_id: str, revision: int) -> None:
+        """Check the revision that a UAV reports.
+
+        Args:
+            uav_id: of a UAV, known or not.
+            revision: of the list on board.
+
+        Raises:
+            InvalidValue: it is above that of its list, and too great to go on from.
+        """
+        most = max(self.get(uav_id).revision, _MOST_FOREIGN)
+        if revision > most:
+            raise InvalidValue(f'uav {uav_id}: list_revision', revision, f'at most {most}')
 
     def raise_revision(self, uav_id: str, revision: int) -> bool:
         """Continue from the revision that a UAV holds; returns whether it is above the known one.

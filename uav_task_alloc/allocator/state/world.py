@@ -140,8 +140,13 @@ class World:
         return self.announced.refuse(task_id, reason, stamp)
 
     def update_uav(self, report: UavReport, now: float, stamp: float) -> str:
-        """Apply the report of a UAV; returns why it is refused, '' if it is not."""
+        """Apply the report of a UAV; returns why the UAV is refused, '' if it is not.
+
+        Raises:
+            InvalidValue: it reports a list of a revision that is too great.
+        """
         uav_id = report.uav_id
+        self.lists.check_revision(uav_id, report.list_revision)
         if uav_id not in self.fleet.records and (refusal := self.admission.admit(uav_id)):
             return refusal
         active = self.fleet.active.get(uav_id)

@@ -16,7 +16,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     to_point,
     to_stamp,
 )
-from uav_task_alloc.nodes.conversions.task_times import from_time
+from uav_task_alloc.nodes.conversions.task_times import from_expected
 from uav_task_alloc.piece_ids import split_piece
 
 _UNASSIGNED = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
@@ -65,7 +65,7 @@ def from_task_status(status: TaskStatus) -> m.TaskStatus:
     return m.TaskStatus(task_id=task_id, piece=piece, pieces_done=status.pieces_done,
                         pieces=status.pieces, state=status.state.value, uav_id=status.uav,
                         reason=status.reason, stamp=to_stamp(status.stamp),
-                        expected=from_time(status.expected))
+                        expected=from_expected(status.expected))
 
 
 def from_allocation(allocation: Allocation, lists: list[m.TaskList],

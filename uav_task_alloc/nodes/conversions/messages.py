@@ -42,7 +42,7 @@ from uav_task_alloc.zone_codec import JOURNAL_ZONE, encode_zone
 
 FRAME_ID = 'map'  # REP-105, ENU
 _LONGEST_REASON = 300  # characters of why a UAV is not available
-_MOST_REVISIONS = 2**31  # half of the range of uint32
+_MOST_REVISIONS = 2**31 - 1  # half of the range of uint32
 
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                      durability=DurabilityPolicy.TRANSIENT_LOCAL)

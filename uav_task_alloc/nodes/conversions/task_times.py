@@ -18,6 +18,7 @@ from uav_task_alloc.record.message_records import from_stamp
 from uav_task_alloc.timetable import clock_text
 
 _MOST_PAYLOAD = 1e6  # [kg]
+_LAST = 2**31 - 1  # [s] whole ones that a message can hold
 
 
 class TaskTimes(TypedDict):
@@ -69,12 +70,24 @@ def from_time(seconds: float) -> Time:
         seconds: [s] of the ROS clock; infinite, 0 or less: none.
 
     Returns:
-        Zero where there is none.
+        Zero where there is none; the last one that a message can hold instead of a later one.
     """
     if not 0.0 < seconds < math.inf:
         return Time()
-    whole = math.floor(seconds)
+    whole = min(math.floor(seconds), _LAST)
     return Time(sec=whole, nanosec=min(999_999_999, round((seconds - whole) * 1e9)))
+
+
+def from_expected(seconds: float) -> Time:
+    """Return a predicted time as a message.
+
+    Args:
+        seconds: [s] of the ROS clock; 0: not known.
+
+    Returns:
+        Zero where it is not known, or later than a message can hold.
+    """
+    return from_time(seconds) if seconds < _LAST + 1 else Time()
 
 
 def put_times(msg: m.Task, task: Task) -> m.Task:
