@@ -195,6 +195,9 @@ class RequestCheck:
         lacking = task.required_capabilities - uav.report.capabilities
         if lacking:
             return f'{uav_id} lacks {first_of(sorted(lacking))}, which {task_id} requires'
+        capacity = uav.report.payload_capacity or 0.0
+        if task.payload > capacity:
+            return f'{task_id}: payload {task.payload:g} kg; {uav_id} takes {capacity:g} kg'
         if not may_fly(task, record.failed_on, uav.report):
             return f'{task_id} failed on {uav_id}'
         order = world.orders.of_uav(uav_id)

@@ -246,6 +246,10 @@ class Flights:
         return record is not None and record.silent and (
             stamp - self._reported.get(uav_id, -math.inf) > FORGOTTEN)
 
+    def reported_at(self, uav_id: str) -> float:
+        """Return when a UAV reported last [s]; inf: not since the clock jumped."""
+        return self._reported.get(uav_id, math.inf)
+
     def at_home_since(self, uav_id: str) -> float | None:
         """Return since when a UAV is on the ground at its home [s]; None: it is not."""
         return self._landed.get(uav_id)

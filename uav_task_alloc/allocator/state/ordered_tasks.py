@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.state.fleet import Fleet
@@ -54,22 +54,34 @@ class OrderedTasks:
                      if can_fly(self._tasks, self._fleet, uav_id, task_id))
 
     def _sequence(self, uav_id: str, open_ids: tuple[str, ...], returns: bool) -> TaskSequence:
-        active, paths = self._active(uav_id), self._paths()
+        active, paths, loads = self._active(uav_id), self._paths(), self._loads(uav_id)
         lead = active if active and active not in open_ids else ''
         tasks = [self._tasks.records[task_id].task for task_id in filter(None, (lead, *open_ids))]
         uav = self._flights.spendable(self._uav(uav_id), max(map(top_of, tasks)))
-        place, metres, seconds = uav.position, 0.0, 0.0
+        place, metres, seconds, now = uav.position, 0.0, 0.0, self._in_air_at(uav)
         for n, task in enumerate(tasks, -1 if lead else 0):
             length, time = _costs(uav, place, task.position, paths)
             metres += length + task.path_length
-            seconds += time + task.stay + self._flights.stop_time
-            seconds += task.path_length / uav.cruise_speed
+            seconds = max(seconds + time, task.earliest - now, task.release - now + time)
+            seconds += task.stay + self._flights.stop_time + task.path_length / uav.cruise_speed
             place = task.end
             back = _costs(uav, place, uav.base, paths) if returns else (0.0, 0.0)
-            why = _why(uav, task.id, metres + back[0], seconds + back[1])
+            why = loads.why_not(task) or _why(uav, task.id, metres + back[0], seconds + back[1])
             if n >= 0 and why:
                 return TaskSequence(open_ids[:n], open_ids[n:], why)
         return TaskSequence(open_ids)
+
+    def _in_air_at(self, uav: Uav) -> float:
+        """When a UAV was at its position [s] clock of the node; inf where waits cost nothing."""
+        return math.inf if self._is_at_base(uav) else self._flights.reported_at(uav.id)
+
+    def _is_at_base(self, uav: Uav) -> bool:
+        return uav.at_base or self._flights.at_home_since(uav.id) is not None
+
+    def _loads(self, uav_id: str) -> _Loads:
+        uav = self._uav(uav_id)
+        listed = self._lists.get(uav_id).task_ids
+        return _Loads(uav, None if self._is_at_base(uav) else listed)
 
     def _active(self, uav_id: str) -> str:
         active = self._fleet.active.get(uav_id, '')
@@ -136,6 +148,30 @@ class OrderedTasks:
         rest = listed[1:] if listed[:1] == (active,) and active not in ordered else listed
         first = tuple(t for t in ordered if t in listed)
         return rest[:len(first)] != first
+
+
+class _Loads:
+    """Payloads of the tasks of one trip, in their order.
+
+    Args:
+        uav: that takes them on.
+        aboard: ids of tasks whose payload it has on board in the air; None: it is at its base.
+    """
+
+    def __init__(self, uav: Uav, aboard: Collection[str] | None) -> None:
+        self._uav, self._aboard, self._sum = uav, aboard, 0.0
+
+    def why_not(self, task: Task) -> str:
+        """Why the payload of the next task cannot be taken along; '' where it can."""
+        if task.payload <= 0.0 or (self._aboard is not None and task.id in self._aboard):
+            return ''
+        if self._aboard is not None:
+            return f'{self._uav.id} is in the air without the payload of {task.id}'
+        self._sum += task.payload
+        if self._sum > self._uav.payload_capacity:
+            return (f'{task.id} in this order is beyond the capacity of {self._uav.id}: payloads '
+                    f'of {self._sum:g} kg, {self._uav.payload_capacity:g} kg at most')
+        return ''
 
 
 def _costs(uav: Uav, place: Point, goal: Point, paths: SafePaths) -> tuple[float, float]:
