@@ -272,6 +272,30 @@ def test_ids_are_of_points_or_of_other_work():
     assert status(driver).state.name == 'PENDING'
 
 
+def test_a_point_does_not_become_work_by_an_update():
+    driver = fleet()
+    driver.add(('field', 500, 0))
+    driver.settle()
+    before = driver.world.tasks.records['field']
+    refused = driver.add(FIELD, action=AnnouncementAction.UPDATE)[0]
+    assert (refused.accepted, refused.reason) == (
+        False, "kind = 'AREA': expected POINT, as it was announced")
+    assert driver.world.tasks.records['field'] == before
+    assert driver.world.works.records == {}
+
+
+def test_an_update_with_a_deadline_that_cannot_be_kept_is_refused():
+    driver = fleet()
+    driver.add(FIELD)
+    driver.settle()
+    for latest, text in ((-500.0, '8 min in the past'), (1.0, 'cannot be kept')):
+        late = replace(FIELD, task=replace(FIELD.task, latest=driver.now + latest))
+        assert text in driver.add(late, action=AnnouncementAction.UPDATE)[0].reason
+    driver.settle()
+    assert driver.world.works.records['field'].work == FIELD
+    assert all(driver.state(each) == 'ASSIGNED' for each in pieces(driver))
+
+
 def test_work_that_is_too_much_or_late_is_refused():
     driver = fleet()
     late = replace(FIELD, task=replace(FIELD.task, latest=driver.now - 5.0))

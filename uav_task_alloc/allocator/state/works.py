@@ -100,6 +100,9 @@ class Works:
     def update(self, work: Work, stamp: float) -> TaskVerdict:
         """Replace the content of work; pieces that are flown stay as they are."""
         known = self.records.get(work.task.id)
+        if known is None and work.task.id in self._tasks.records:
+            return TaskVerdict(work.task.id, False, str(InvalidValue(
+                'kind', work.kind.name, 'POINT, as it was announced')))
         if known is None:
             return self._tasks.update(work.task, stamp)  # refuses it
         state = self.state(known)
@@ -112,6 +115,9 @@ class Works:
             pieces = self._cut(self._as_cut(replace(known, work=work)) if begun else work)
         except _NO_CUT as error:
             return TaskVerdict(known.id, False, str(error))
+        whys = [self._refusal(piece, stamp) for piece in pieces]
+        if all(whys):
+            return TaskVerdict(known.id, False, whys[0])
         self._recut(replace(known, work=work), pieces, stamp, 'changed', renew=True)
         return TaskVerdict(known.id, True)
 
