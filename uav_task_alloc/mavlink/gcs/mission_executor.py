@@ -80,8 +80,7 @@ class MissionExecutor:
                                     now, record, save)
         self.authority = self.watch.authority
         self.energy = VehicleEnergy(self.telemetry, self.onboard)
-        self.events: deque[TaskProgress] = deque()
-        self.notes: deque[OperatorNote] = deque()
+        self.events, self.notes = deque[TaskProgress](), deque[OperatorNote]()
         self._rates, self._event_retry = MessageRates(peer, self.telemetry, now), EventRetry()
         self._end_actions, log = EndActions(peer, profile, self.onboard), StatusTextLog()
         self._was_stale, self._restarts = False, 0
