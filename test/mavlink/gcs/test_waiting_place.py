@@ -98,8 +98,9 @@ def test_another_place_replaces_the_one_under_way(kind):
     assert bench.run(lambda: off(bench, WAY[-1]) < 120.0, 60.0)
     bench.assign(waits(3, ((-100.0, 150.0, 50.0),)))
     assert bench.run(lambda: off(bench, (-100.0, 150.0, 50.0)) < 3.0, 90.0)
-    bench.run(limit=20.0)
+    bench.run(limit=60.0)
     assert off(bench, (-100.0, 150.0, 50.0)) < 3.0
+    assert not any('held for 30 s' in note for note in bench.notes)
 
 
 @BOTH

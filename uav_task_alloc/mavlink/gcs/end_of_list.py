@@ -91,6 +91,7 @@ class EndOfList:
         flying = telemetry.mode is ModeFunction.MISSION and not onboard.progress.finished
         if flying and end and rest and all_alike(end[-len(rest):], rest):
             self.going_home = tasks.returns
+            self.end_hold()
             return sender.satisfied()
         if self._just_landed(now):
             return []
