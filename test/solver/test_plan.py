@@ -57,6 +57,16 @@ def test_without_tasks_or_uavs_the_plan_is_empty():
     assert quick([], [Task('t', (0.0, 0.0, 0.0))]).unassigned == {'t': 'there are no UAVs'}
 
 
+@pytest.mark.parametrize('objective', ['distance', 'finish', 'response', 'balanced'])
+def test_without_uavs_ways_loads_and_windows_are_left_out(objective):
+    start, end = (100.0, 0.0, 50.0), (300.0, 0.0, 50.0)
+    tasks = [Task('line', start, path=(start, end), reversible=True),
+             Task('load', end, payload=2.0, latest=50.0), Task('t', start)]
+    for trips in (1, 2):
+        assert quick([], tasks, objective=objective, trips=trips).unassigned == dict.fromkeys(
+            ('line', 'load', 't'), 'there are no UAVs')
+
+
 def test_coincident_points_and_range_0_are_served():
     tasks = [Task(f't{i}', (0.0, 0.0, 0.0)) for i in range(4)]
     result = quick([Uav('u1', (0.0, 0.0, 0.0), range=0.0)], tasks)

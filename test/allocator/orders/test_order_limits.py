@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Orders of tasks that a UAV cannot fly: its capacity, payloads in the air, waits in the air."""
+"""Orders at limits: capacity, payloads and waits in the air, no UAV that may fly."""
 import pytest
 from allocation import AllocatorDriver
 
 from uav_task_alloc import plan
 from uav_task_alloc.model import Task
+from uav_task_alloc.work.pieces import Work
+from uav_task_alloc.work.values import Kind
 
 LIMITS = {'range': 8000.0, 'full_range': 8000.0, 'endurance': 600.0, 'battery': 0.9}
 
@@ -75,3 +77,16 @@ def test_a_wait_in_the_air_counts_and_one_on_the_ground_does_not(window):
         assert answer.success == standby
         assert standby or answer.message.startswith(
             'refused: later in this order is beyond the endurance of a: it needs 30')
+
+
+def test_a_dry_run_of_the_resumption_of_the_only_uav_has_a_price_where_a_way_is_open():
+    made = driver()
+    made.world.forget_uav('b')
+    way = ((100.0, 0.0, 50.0), (300.0, 0.0, 50.0))
+    made.add(Work(Task('line', way[0]), Kind.LINE, way))
+    made.settle()
+    assert made.order('PAUSE', 'a').success
+    made.settle()
+    answer = made.order('RESUME', 'a', dry_run=True)
+    assert answer.success
+    assert answer.distance > 0.0

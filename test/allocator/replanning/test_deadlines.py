@@ -11,6 +11,8 @@ from uav_task_alloc.allocator.records import AnnouncementAction
 from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.allocator.status import health_warnings
 from uav_task_alloc.model import Task
+from uav_task_alloc.work.pieces import Work
+from uav_task_alloc.work.values import Kind
 
 SPEED = 10.0  # [m/s]
 
@@ -35,6 +37,21 @@ def report(made, places, seconds=0.0, **more):
         uav(made, uav_id, x, y, **more)
     made.core.tick(made.now, made.now)
     made.settle(report=False)
+
+
+@pytest.mark.parametrize('path', [((1000, 0, 50), (100, 0, 50)), ((100, 0, 50), (1000, 0, 50))])
+def test_a_deadline_that_one_end_of_a_line_keeps_is_accepted(path):
+    made = driver()
+    uav(made, 'a', 0)
+    latest = made.now + 40.0
+    work = Work(Task('line', path[0], latest=latest), Kind.LINE, path)
+    assert made.add(work)[0].accepted
+    made.settle()
+    stop, = made.lists['a'].stops
+    assert stop.entry == (100.0, 0.0, 50.0)
+    assert made.now + stop.start < latest
+    late = replace(work, task=replace(work.task, id='late', latest=made.now + 5.0))
+    assert 'cannot be kept' in made.add(late)[0].reason
 
 
 def test_a_uav_waits_for_a_window_and_the_start_is_expected_at_its_begin():

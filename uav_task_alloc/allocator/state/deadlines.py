@@ -147,7 +147,8 @@ class Deadlines:
             if at_best:
                 speed = max(pace.speed, record.report.cruise_speed or 0.0)
                 pace = FlightPace(speed + math.hypot(*pace.wind), pace.climb, pace.descent)
-            seconds = pace.seconds((record.report.position, task.position))
+            places = (task.position, task.end) if task.reversible else (task.position,)
+            seconds = min(pace.seconds((record.report.position, place)) for place in places)
             best = min(best, (max(max(begin, task.release) + seconds, task.earliest), uav_id))
         return best
 

@@ -62,7 +62,7 @@ def ways_of_tasks(problem: Problem, nodes: int,
         return far, lengths, np.empty((len(classes), 0))
     along = [[service_seconds(fleet, each) for task in tasks for each in (task, task.turned)]
              for fleet in _one_of_each(problem.uavs, classes)]
-    return far, lengths, np.array(along).reshape(len(classes), -1)
+    return far, lengths, np.array(along, np.float64).reshape(len(classes), 2 * len(tasks))
 
 
 def _one_of_each(uavs: Sequence[Uav], classes: Sequence[Speeds]) -> list[Uav]:

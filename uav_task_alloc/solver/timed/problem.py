@@ -177,7 +177,7 @@ def _longest_cost(problem: Problem, a: TimedArrays, far: float) -> float:
     goal, rows = problem.rules.objective, a.fixed[a.uavs:a.ends]
     if not a.timed_cost:
         return 0.0
-    legs = rows[:, at.SERVICE].sum() + far * 2.0 * float(a.pace[:, 0].max()) * len(rows)
+    legs = rows[:, at.SERVICE].sum() + far * 2.0 * float(a.pace[:, 0].max(initial=0.0)) * len(rows)
     opened = max(float(rows[:, column][np.isfinite(rows[:, column])].max(initial=0.0))
                  for column in (at.OPENS, at.RELEASE, at.TRIP_RELEASE))
     horizon = opened + a.begin[:, at.READY].max(initial=0.0) + legs / max(1, a.uavs)

@@ -162,7 +162,7 @@ def compatible_trips(problem: Problem, aboard: Mapping[str, frozenset[str]]) -> 
     if not loaded:
         return both
     holder = {name: uav_id for uav_id, names in aboard.items() for name in names}
-    flying = np.array([not uav.at_base for uav in problem.uavs])
+    flying = np.array([not uav.at_base for uav in problem.uavs], np.bool_)
     both[0][np.ix_(flying, np.array(loaded))] = False
     index = {uav.id: u for u, uav in enumerate(problem.uavs)}
     for i in loaded:
