@@ -37,7 +37,8 @@ def with_height_limits(world: World, uavs: Sequence[Uav], tasks: Sequence[Task],
         they are too high for; and why they are, by task id.
     """
     able, refused = list[Uav](), dict[str, dict[str, str]]()
-    highest_first = sorted(tasks, key=top_of, reverse=True)
+    highest_first = dict(sorted(((task.id, (top_of(task), task)) for task in tasks),
+                                key=lambda each: each[1][0], reverse=True))
     for uav in uavs:
         if math.isinf(uav.endurance):
             able.append(uav)
@@ -71,26 +72,37 @@ def with_height_reasons(plan: Plan, too_high: Mapping[str, str], tasks: Sequence
     return replace(plan, unassigned={**plan.unassigned, **reasons}) if reasons else plan
 
 
-def _height_limit(world: World, uav: Uav, tasks: Sequence[Task], locked: Collection[str],
-                  stamp: float) -> tuple[float, list[tuple[Task, str]]]:
-    """The height [m] of the highest task that a UAV may get; the higher ones, and why not."""
+def _height_limit(world: World, uav: Uav, tasks: Mapping[str, tuple[float, Task]],
+                  locked: Collection[str], stamp: float) -> tuple[float, list[tuple[Task, str]]]:
+    """The height [m] of the highest task that a UAV may get; the higher ones, and why not.
+
+    tasks: with their heights [m], by id, the highest first.
+    """
     own = {stop.task.id: top_of(stop.task) for stop in world.list_of(uav.id).stops}
     own.update(dict.fromkeys(locked, math.inf))
     # a listed task that was moved up is judged as a new one
-    limit = max((top_of(task) for task in tasks if top_of(task) <= own.get(task.id, -math.inf)
+    present = ((tasks[task_id], top) for task_id, top in own.items() if task_id in tasks)
+    limit = max((top for (top, task), before in present if top <= before
                  and _may_get(uav, task)), default=-math.inf)
-    flight, whys = world.flights.of(uav.id, stamp), list[tuple[Task, str]]()
-    needed = finish_time(world.lists.restamped(uav.id, stamp, flight), flight) if flight else 0.0
-    for task in tasks:
-        if top_of(task) <= limit:
+    whys, needed = list[tuple[Task, str]](), math.nan
+    for top, task in tasks.values():
+        if top <= limit:
             break
         if not _may_get(uav, task):
             continue
+        needed = _needed(world, uav, stamp) if math.isnan(needed) else needed
         why = _why_too_high(world, uav, task, needed)
         if not why:
-            return top_of(task), whys
+            return top, whys
         whys.append((task, why))
     return limit, whys
+
+
+def _needed(world: World, uav: Uav, stamp: float) -> float:
+    """The time in the air [s] that the list in force of a UAV still takes."""
+    flight = world.flights.of(uav.id, stamp)
+    return 0.0 if flight is None else finish_time(
+        world.lists.restamped(uav.id, stamp, flight), flight)
 
 
 def _may_get(uav: Uav, task: Task) -> bool:
