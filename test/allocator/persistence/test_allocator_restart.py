@@ -6,6 +6,7 @@ from allocation import AllocatorDriver
 
 from uav_task_alloc import plan
 from uav_task_alloc.allocator.persistence.restore import restored_state
+from uav_task_alloc.allocator.records import AnnouncementAction
 from uav_task_alloc.allocator.replanning.learned_state import learned_row, learned_state
 from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Task, ThreatZone
@@ -90,12 +91,44 @@ def test_an_event_of_the_time_the_allocator_was_down_counts_when_it_is_repeated(
 def test_a_uav_that_has_passed_a_task_flew_it_while_the_allocator_was_down(rows):
     before, = (each for each in restored_state(rows).lists if each.uav == 'a')
     first, second = before.task_ids
-    for revision, state in ((before.revision - 1, 'ASSIGNED'), (before.revision, 'COMPLETED')):
+    for step, state in ((-1, 'ASSIGNED'), (1, 'ASSIGNED'), (0, 'COMPLETED')):
         driver = AllocatorDriver(restored_state(rows))
-        driver.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=revision)
+        driver.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=before.revision + step)
+        driver.settle()
+        assert driver.state(first) == 'ASSIGNED'  # the bridge may say how it ended
+        driver.settle(wait=4.0)
         assert driver.state(first) == state
-    driver.settle()
+    assert driver.reason(first) == 'passed while the allocator was down'
     assert driver.route('a') == (second,)
+
+
+@pytest.mark.parametrize('what', ['failed', 'changed', 'flown now'])
+def test_a_task_that_a_uav_has_passed_without_flying_it_stays_open(rows, what):
+    before, = (each for each in restored_state(rows).lists if each.uav == 'a')
+    first, second = before.task_ids
+    driver = AllocatorDriver(restored_state(rows))
+    driver.uav('c', 0.0, 0.0, 50.0)
+    driver.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=before.revision)
+    if what == 'failed':
+        assert driver.event('FAILED', first, 'a', before.revision, 'terrain') == ''
+    elif what == 'changed':
+        assert driver.add((first, 70, 70), action=AnnouncementAction.UPDATE)[0].accepted
+    else:
+        driver.uav('a', 0.0, 0.0, 50.0, active_task=first, list_revision=before.revision)
+    driver.settle(wait=4.0)
+    driver.settle()
+    assert driver.state(first) in ('ASSIGNED', 'ACTIVE')
+    assert (first in driver.world.list_of('c').task_ids) == (what == 'failed')
+
+
+def test_a_uav_that_reports_after_the_hold_is_not_compared(rows):
+    before, = (each for each in restored_state(rows).lists if each.uav == 'a')
+    first, second = before.task_ids
+    driver = AllocatorDriver(restored_state(rows))
+    driver.settle(wait=30.0)
+    driver.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=before.revision)
+    driver.settle(wait=4.0)
+    assert driver.state(first) == 'ASSIGNED'
 
 
 def test_an_unreadable_row_is_left_out_and_named(rows):
@@ -164,7 +197,7 @@ def test_shortly_after_a_restart_no_task_changes_hands(seconds, first_report):
     assert after.route('b') == ('t2',)
 
 
-def test_a_list_that_was_resent_is_flown_in_its_order():
+def test_a_uav_with_the_list_that_was_resent_reports_itself_what_it_has_flown():
     driver = AllocatorDriver()
     driver.uav('a', 0.0, 0.0, 50.0)
     driver.add(('t1', 100, 0), ('t2', 200, 0))
@@ -174,8 +207,11 @@ def test_a_list_that_was_resent_is_flown_in_its_order():
     after.take()
     assert after.lists['a'].revision == 2
     after.uav('a', 150.0, 0.0, 50.0, active_task='t2', list_revision=2)
-    assert (after.state('t1'), after.reason('t1')) == (
-        'COMPLETED', 'passed while the allocator was down')
+    after.settle(wait=2.0)
+    assert set(after.route('a')) == {'t1', 't2'}
+    assert after.event('COMPLETED', 't1', 'a', revision=2) == ''
+    after.settle(wait=2.0)
+    assert (after.state('t1'), after.reason('t1'), after.route('a')) == ('COMPLETED', '', ('t2',))
 
 
 def test_no_list_is_resent_with_a_task_completed_out_of_turn():

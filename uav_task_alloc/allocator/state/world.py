@@ -152,7 +152,7 @@ class World:
         active = self.fleet.active.get(uav_id)
         before = self.fleet.update(report, now, self.params.battery_reserve)
         self.flights.update(report, stamp)
-        self._missed.complete(report, stamp)
+        self._missed.observe(report, stamp)
         for reason in replan_reasons(before, self.fleet.records[uav_id]):
             self.note(f'{uav_id} {reason}')
             self.request_replan(f'{uav_id} {reason}', now)
@@ -233,6 +233,7 @@ class World:
     def release_hold(self, now: float) -> None:
         """End the hold after a restart: tasks may go to other UAVs."""
         self.restart_hold = False
+        self.outbox.statuses |= self._missed.complete(self.fleet.active)
         self.request_replan('some time after a restart', now)
 
     def request_replan(self, trigger: str, now: float) -> None:
