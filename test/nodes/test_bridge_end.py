@@ -65,7 +65,8 @@ def test_a_bridge_that_exits_takes_no_list_and_starts_no_take_off(sky, probe):
 
 def session(uav_id, airborne, replacing_since, lost=False):
     return SimpleNamespace(uav_id=uav_id, executor=SimpleNamespace(
-        telemetry=SimpleNamespace(airborne=airborne, lost=lambda now: lost),
+        telemetry=SimpleNamespace(
+            airborne=airborne, link=SimpleNamespace(lost=lambda now: lost)),
         watch=SimpleNamespace(replacing_since=replacing_since)))
 
 
