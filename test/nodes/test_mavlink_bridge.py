@@ -251,11 +251,15 @@ def test_authority_persists_over_a_restart_of_the_bridge(sky, probe, tmp_path):
     assert world.fact(1, 'authority_why') == 'landed'
 
 
-def test_a_corrupt_authority_file_is_reported(sky, probe, tmp_path):
+def test_a_corrupt_authority_file_is_reported_and_awaits_a_hand_over(sky, probe, tmp_path):
     path = tmp_path / 'authority_uav_1.json'
     path.write_text('{')
     world = sky('-p', f'state_dir:={tmp_path}')
     assert f'{path}: Expecting' in world.bridge.output()
+    world.until(lambda: world.states['uav_2'].authority == m.UavState.HELD)
+    world.until(lambda: world.states['uav_1'].reason == (
+        'authority NONE: its authority file cannot be used; given back by ~/hand_over'))
+    world.until(lambda: hand_over(probe, 'uav_1')[0])
     world.until(lambda: world.states['uav_1'].authority == m.UavState.HELD)
 
 

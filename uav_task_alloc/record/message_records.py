@@ -142,13 +142,14 @@ def zones_record(msg: _Message) -> RecordBody:
         msg: ThreatZoneArray.
 
     Returns:
-        Kind `zones`; each zone as JSON values.
+        Kind `zones`; each zone as JSON values, and the ids of invalid ones: they stay as they were.
 
     Raises:
         InvalidValue: there are too many zones or vertices.
     """
-    valid, _ = decode_zone_array(msg)
-    return {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in valid]}
+    valid, invalid = decode_zone_array(msg)
+    return {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in valid],
+            **({'kept': list(invalid)} if invalid else {})}
 
 
 def statuses_record(msg: _Message) -> RecordBody:

@@ -27,6 +27,7 @@ from uav_task_alloc.zone_codec import decode_zone
 # share by which a measured clock rate varies, and that of a real vehicle over a bad link
 _RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
 _MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
+_OPEN = frozenset({'PENDING', 'ASSIGNED', 'ACTIVE', 'UNASSIGNED'})
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
 
@@ -111,12 +112,19 @@ class RunState:
                 self.cancelled.add(task['id'])
             else:
                 known = self.tasks.get(task['id'])
+                if known and line['action'] == 'ADD' and self._is_open(task['id']):
+                    continue  # refused, or as it is already
                 self.tasks[task['id']] = AnnouncedTask(
                     tuple(task['position']), known.wall if known else line['wall'],
                     task.get('service', 0.0), task.get('earliest'), task.get('latest'),
                     task.get('work', ''), tuple(map(tuple, task.get('path', ()))),
                     tuple(tuple(map(tuple, hole)) for hole in task.get('holes', ())),
                     task.get('radius') or 0.0)
+
+    def _is_open(self, task_id: str) -> bool:
+        """Whether the allocator has the task, so that only an UPDATE changes it."""
+        status = self.statuses.get(task_id)
+        return status is not None and status.state in _OPEN
 
     def on_statuses(self, line: Line) -> None:
         """The statuses of all tasks."""
@@ -155,8 +163,13 @@ class RunState:
             self.alerts[tuple(line['uavs'])] = line
 
     def on_zones(self, line: Line) -> None:
-        """The set of all zones: a missing zone has ended, a new one begins."""
-        current = dict.fromkeys(decode_zone(row) for row in line['zones'])  # in order
+        """The set of all zones: a missing zone has ended, a new one begins.
+
+        One that was invalid in the message stays as it was, as in the allocator.
+        """
+        valid = [decode_zone(row) for row in line['zones']]
+        kept = {*line.get('kept', ())} - {zone.id for zone in valid}
+        current = dict.fromkeys([*valid, *(zone for zone in self.zones_now() if zone.id in kept)])
         self.zones = [old if old.until < math.inf or old.zone in current
                       else ZoneInterval(old.zone, old.since, line['wall']) for old in self.zones]
         in_force = set(self.zones_now())

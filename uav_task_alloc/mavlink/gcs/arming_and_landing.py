@@ -18,7 +18,7 @@ from uav_task_alloc.mavlink.gcs.telemetry import DISARM_PAUSE
 # [0..1] a battery of at least this, which is fuller than at the landing by that, was changed
 _FULL, _RISE = 0.9, 0.05
 _AT_REST = 0.3  # [m/s], less than the last part of a descent (LAND_SPEED, MPC_LAND_SPEED)
-_FALL = 1.5  # [m] in DISARM_PAUSE
+_FALL = 3.0  # [m] in DISARM_PAUSE; a height changes by less when the propellers stop
 
 
 class ArmingAndLanding:
@@ -100,8 +100,8 @@ class ArmingAndLanding:
         return high and not (may_land and telemetry.speed < _AT_REST)
 
     def _check_fall(self, now: float) -> None:
-        """Apply a kill where it falls after it was disarmed at rest."""
-        if now - self._disarmed_at <= DISARM_PAUSE and not self._state.armed and (
+        """Apply a kill where it falls after it was disarmed at rest, well above the ground."""
+        if self._height > OFF_GROUND and now - self._disarmed_at <= DISARM_PAUSE and not self._state.armed and (
                 self._state.telemetry.height < self._height - _FALL):
             self._disarmed_at = -math.inf
             self._state.apply(AuthorityEvent.KILLED, now, 'fell after it was disarmed')

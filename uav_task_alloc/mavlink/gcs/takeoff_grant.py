@@ -36,8 +36,8 @@ class TakeoffGrant:
             authority.until_landing = False
         if authority.state is not AuthorityState.SUSPENDED or takeoff:
             self.takeoff = takeoff  # else it is applied after the suspension
-        if takeoff and state.armed and authority.state is AuthorityState.NONE and (
-                not authority.undecided):
+        if takeoff and state.armed and authority.state is AuthorityState.NONE and not (
+                authority.undecided or authority.landed):
             authority.landed = True  # armed by a pilot, whose hands may be at the propellers
             authority.why = 'armed, not by the bridge, when takeoff became true'
         if (takeoff and idle and authority.state is AuthorityState.NONE and not authority.landed

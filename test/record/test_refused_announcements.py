@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the allocator refuses changes nothing of a recorded run: tasks announced twice, zones."""
+from types import SimpleNamespace
+
+from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.record.message_records import zones_record
+from uav_task_alloc.record.run_state import RunState
+from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
+
+
+def announce(run, action, x, wall):
+    run.apply({'kind': 'announcement', 'wall': wall, 'action': action,
+               'tasks': [{'id': 't1', 'position': [x, 0.0, 50.0]}]})
+
+
+def status(run, state):
+    run.apply({'kind': 'statuses', 'wall': 2.0, 'statuses': [
+        {'task': 't1', 'state': state, 'uav': '', 'reason': ''}]})
+
+
+def test_a_second_add_of_an_open_task_moves_nothing():
+    run = RunState()
+    announce(run, 'ADD', 100.0, 1.0)
+    status(run, 'ASSIGNED')
+    announce(run, 'ADD', 900.0, 3.0)
+    assert run.tasks['t1'].position == (100.0, 0.0, 50.0)
+    announce(run, 'UPDATE', 200.0, 4.0)
+    assert run.tasks['t1'].position == (200.0, 0.0, 50.0)
+    status(run, 'COMPLETED')
+    announce(run, 'ADD', 900.0, 5.0)
+    assert run.tasks['t1'].position == (900.0, 0.0, 50.0)
+
+
+def zone_message(zone_id, margin):
+    return SimpleNamespace(zone_id=zone_id, shape=1, center=SimpleNamespace(x=50.0, y=0.0, z=0.0),
+                           radius=20.0, vertices=[], z_min=0.0, z_max=200.0, margin=margin)
+
+
+def test_a_zone_that_is_invalid_in_a_message_stays_as_it_was():
+    run = RunState()
+    for wall, zones in ((1.0, [zone_message('z1', 0.0), zone_message('z2', 0.0)]),
+                        (2.0, [zone_message('z1', -1.0)])):
+        run.apply({'wall': wall, **zones_record(SimpleNamespace(zones=zones))})
+    assert [zone.id for zone in run.zones_now()] == ['z1']
+    moved = ThreatZone.cylinder('z1', (70.0, 0.0), 20.0)
+    run.apply({'kind': 'zones', 'wall': 3.0, 'zones': [encode_zone(moved, JSON_ZONE)],
+               'kept': ['z1']})
+    assert run.zones_now() == [moved]
