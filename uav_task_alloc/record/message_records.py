@@ -142,7 +142,7 @@ def zones_record(msg: _Message) -> RecordBody:
         msg: ThreatZoneArray.
 
     Returns:
-        Kind `zones`; each zone as JSON values, and the ids of invalid ones: they stay as they were.
+        Kind `zones`; each zone as JSON values, and the ids of the invalid ones, which stay.
 
     Raises:
         InvalidValue: there are too many zones or vertices.

@@ -101,7 +101,8 @@ class ArmingAndLanding:
 
     def _check_fall(self, now: float) -> None:
         """Apply a kill where it falls after it was disarmed at rest, well above the ground."""
-        if self._height > OFF_GROUND and now - self._disarmed_at <= DISARM_PAUSE and not self._state.armed and (
+        may_fall = self._height > OFF_GROUND and now - self._disarmed_at <= DISARM_PAUSE
+        if may_fall and not self._state.armed and (
                 self._state.telemetry.height < self._height - _FALL):
             self._disarmed_at = -math.inf
             self._state.apply(AuthorityEvent.KILLED, now, 'fell after it was disarmed')
