@@ -314,14 +314,20 @@ def test_a_foreign_mission_on_a_vehicle_that_is_not_held_changes_nothing(kind, s
     assert sends_no_command(bench, 20.0)
 
 
-@BOTH
-def test_a_foreign_mission_on_the_ground_is_left_though_nothing_was_granted(kind):
+def with_foreign_mission(kind):
+    """NONE, on the ground, with a mission that another station has put on board."""
     bench = on_ground(kind, N)
     bench.assign(task_list('AB', 2))
     assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 20.0)
     bench.run(limit=5.0)
     upload_by_another(bench, items=7)
     assert bench.run(lambda: bench.onboard().mission.is_foreign, 70.0)
+    return bench
+
+
+@BOTH
+def test_a_foreign_mission_on_the_ground_is_left_though_nothing_was_granted(kind):
+    bench = with_foreign_mission(kind)
     stored, start = list(bench.vehicles[1].mission.items), len(bench.sent)
     bench.assign(task_list('ZY', 3))
     bench.run(limit=100.0)
@@ -338,12 +344,7 @@ def test_a_foreign_mission_on_the_ground_is_left_though_nothing_was_granted(kind
 
 @BOTH
 def test_a_pilot_who_flies_a_mission_of_another_station_is_not_held(kind):
-    bench = on_ground(kind, N)
-    bench.assign(task_list('AB', 2))
-    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 20.0)
-    bench.run(limit=5.0)
-    upload_by_another(bench, items=7)
-    assert bench.run(lambda: bench.onboard().mission.is_foreign, 70.0)
+    bench = with_foreign_mission(kind)
     start, vehicle = len(bench.sent), bench.vehicles[1]
     vehicle.rc_mode(MODES[kind].stick)
     assert vehicle.rc_arm(True)
