@@ -5,6 +5,7 @@ from authority_bench import (
     ARDUPILOT,
     BOTH,
     MODES,
+    H,
     L,
     S,
     flying,
@@ -70,8 +71,12 @@ def test_a_mission_that_a_pilot_flies_since_the_bridge_was_down_is_left(kind, me
 
 
 @BOTH
-def test_a_vehicle_that_was_rebooted_since_the_record_and_flies_is_left_to_its_pilot(kind):
+@pytest.mark.parametrize('mode', ['mission', 'hold'])
+def test_a_vehicle_that_was_rebooted_since_the_record_is_left_to_its_pilot(kind, mode):
     bench = flying(kind)
+    if mode == 'hold':
+        bench.assign(task_list('', 2))
+        assert bench.run(lambda: bench.executor().watch.mode == MODES[kind].hold, 10.0)
     vehicle, modes = bench.vehicles[1], MODES[kind]
     bench.run(limit=60.0)
     bench.kill()
@@ -84,14 +89,18 @@ def test_a_vehicle_that_was_rebooted_since_the_record_and_flies_is_left_to_its_p
     vehicle.rc_stick((0.0, 0.0, 3.0))
     bench.run(limit=12.0)
     vehicle.rc_stick(None)
-    assert vehicle.rc_mode(modes.mission)  # with our mission, which is still on board
+    bench.from_station(set_mode(getattr(modes, mode), kind))  # our mission is still on board
+    bench.run(limit=2.0)
     bench.start()
     bench.discover()
     start = len(bench.sent)
     bench.assign(task_list('XYZ', 7))
     bench.run(limit=20.0)
-    assert bench.authority() is L
-    assert bench.commands(start) == []
+    if (kind, mode) == ('ardupilot', 'mission'):  # it sends no clock since, and flies our mission
+        assert bench.authority() is H
+    else:
+        assert bench.authority() is L
+        assert bench.commands(start) == []
 
 
 @BOTH

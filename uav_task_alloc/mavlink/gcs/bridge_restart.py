@@ -69,8 +69,10 @@ class BridgeRestart:
         self._awaits_clock = rebooted is None and now - self._first_at < _CLOCK_TIME
         if self._awaits_clock:
             return
-        # the rates that the previous run has asked for end only with a reboot
-        rebooted = rebooted is not False
+        if rebooted is None:
+            # the rates that the previous run has asked for end only with a reboot; but a pilot who
+            # flies our mission hands it over, and another mission is found when it is read
+            rebooted = state.class_of(state.mode) is not ModeClass.MISSION
         agrees = self._agrees(record) and not rebooted
         if agrees and record.replacing_since is not None and (
                 state.class_of(state.mode) is ModeClass.HOLD):
