@@ -19,6 +19,7 @@ from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority_state import UNUSABLE, AuthorityState
+from uav_task_alloc.mavlink.gcs.sent_commands import SentCommands
 
 
 def killed(bench):
@@ -157,6 +158,19 @@ def test_a_return_of_the_pilot_after_ours_was_refused_is_a_loss(kind):
     bench.from_station(set_mode(MODES[kind].rtl, kind))
     assert bench.reaches(L, 3.0)
     assert sends_no_command(bench, 40.0)
+
+
+@pytest.mark.parametrize(('attempts', 'expected'), [(1, False), (2, True)])
+def test_a_refusal_ends_the_wait_for_a_mode_unless_another_attempt_may_set_it(
+        attempts, expected):
+    sent, command = SentCommands(), d.MAV_CMD_DO_SET_MODE
+    for n in range(attempts):
+        sent.acks.command_sent(command, 6, float(n))
+        sent.add_mode(6, float(n))
+    sent.receive_command_ack(d.MAVLink_command_ack_message(
+        command, d.MAV_RESULT_TEMPORARILY_REJECTED, 0, 0, 245, 190), 9)
+    assert sent.was_recently_sent(6, 3.0) is expected
+    assert sent.confirm_mode(6, 3.0) is expected
 
 
 # a grant by `takeoff`

@@ -40,7 +40,8 @@ class ModeAcks:
         """Process the MAV_RESULT of a MAV_CMD, and the number of its frame.
 
         Returns:
-            The custom_mode that is refused; None: none, or it is not known which.
+            The custom_mode that is refused, and that no command without a COMMAND_ACK may still
+            set; None: none, or it is not known which.
         """
         mode = next((mode for sent, mode in reversed(self._pending) if sent == command), None)
         if mode is None or result == d.MAV_RESULT_IN_PROGRESS:
@@ -48,7 +49,7 @@ class ModeAcks:
         self._pending.remove((command, mode))
         if self._pending and self._mixed:
             return None
-        refused = result != d.MAV_RESULT_ACCEPTED and not self._mixed
+        refused = result != d.MAV_RESULT_ACCEPTED and not (self._pending or self._mixed)
         accepted = result == d.MAV_RESULT_ACCEPTED and not self._mixed
         if accepted:
             self._frame = min(frame, self._frame) if self._entered == mode else frame
