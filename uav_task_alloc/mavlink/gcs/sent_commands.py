@@ -57,9 +57,12 @@ class SentCommands:
             self.armed_frame = frame
 
     def _remove_refused(self, mode: int) -> None:
-        """Remove the commands for a mode that the vehicle does not enter by them."""
-        self.modes = [each for each in self.modes if each[0] != mode]
-        self.sent_at.pop(mode, None)
+        """Remove one command for a mode that the vehicle does not enter by it."""
+        index = next((n for n, each in enumerate(self.modes) if each[0] == mode), None)
+        if index is not None:
+            del self.modes[index]
+        if all(each[0] != mode for each in self.modes):
+            self.sent_at.pop(mode, None)
 
     def take_armed_before(self, frame: int) -> bool:
         """Whether arming was accepted before this frame was sent; True once."""
