@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
@@ -269,10 +269,20 @@ def _spots(points: _Floats) -> str:
     return ' to '.join(_shown(point) for point in points[::max(1, len(points) - 1)][:2])
 
 
-def _opened(opener: Callable[[Path], Any], path: Path) -> Any:
-    """Open a raster; what it lacks is said by errors, not by warnings."""
-    warnings.simplefilter('ignore')
-    return opener(path)
+def _read_raster(rasterio: Any, path: Path) -> tuple[_Floats, Any, tuple[float, ...]]:
+    """The heights of a raster, its projection, and the coefficients from places to pixels."""
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')  # what it lacks is said below
+        with rasterio.open(path) as raster:
+            if raster.crs is None:
+                raise TerrainError(f'{path}: it has no projection: expected a GeoTIFF with one')
+            if raster.transform.is_identity or raster.transform.is_degenerate:
+                raise TerrainError(f'{path}: it has no position: expected a GeoTIFF with one')
+            if raster.width * raster.height > _LARGEST or min(raster.width, raster.height) < 2:
+                raise TerrainError(f'{path}: {raster.width} x {raster.height} pixels: expected '
+                                   f'2 x 2 to {_LARGEST} in all')
+            heights = raster.read(1, masked=True).astype(np.float64).filled(np.nan)
+            return heights, raster.crs, tuple(~raster.transform)[:6]
 
 
 def read_terrain(path: Path, origin: Origin) -> Terrain:
@@ -295,16 +305,7 @@ def read_terrain(path: Path, origin: Origin) -> Terrain:
         raise TerrainError(f"{path}: reading terrain needs rasterio: expected "
                            "pip install 'uav_task_alloc[terrain]'") from None
     try:
-        with warnings.catch_warnings(), _opened(rasterio.open, path) as raster:
-            if raster.crs is None:
-                raise TerrainError(f'{path}: it has no projection: expected a GeoTIFF with one')
-            if raster.transform.is_identity or raster.transform.is_degenerate:
-                raise TerrainError(f'{path}: it has no position: expected a GeoTIFF with one')
-            if raster.width * raster.height > _LARGEST or min(raster.width, raster.height) < 2:
-                raise TerrainError(f'{path}: {raster.width} x {raster.height} pixels: expected '
-                                   f'2 x 2 to {_LARGEST} in all')
-            heights = raster.read(1, masked=True).astype(np.float64).filled(np.nan)
-            crs, (a, b, c, d, e, f) = raster.crs, tuple(~raster.transform)[:6]
+        heights, crs, (a, b, c, d, e, f) = _read_raster(rasterio, path)
     except (rasterio.errors.RasterioError, MemoryError) as error:
         raise TerrainError(f'{path}: {error}: expected a GeoTIFF') from None
     if not np.isfinite(heights).any():

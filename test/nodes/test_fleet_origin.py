@@ -92,12 +92,18 @@ def test_finding_37_an_allocator_of_another_origin_is_not_flown(sky, start, prob
     fleet.until_state('t1', S.COMPLETED)
 
 
-def test_finding_37_an_allocator_resumes_planning_when_the_other_origin_disappears(start, probe):
+def in_conflict(start, probe):
+    """(fleet, publisher of the other origin, allocator that refuses to plan for it)."""
     fleet = Fleet(probe)
     other = publish_origin_first(probe)
     node = begin(start, fleet)
     probe.until(lambda: 'refuses to plan: fleet_origin' in node.output())
     fleet.uav('a', 0.0)
+    return fleet, other, node
+
+
+def test_finding_37_an_allocator_resumes_planning_when_the_other_origin_disappears(start, probe):
+    fleet, other, _ = in_conflict(start, probe)
     fleet.tasks.publish(add(task('t0', 100)))
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
     probe.until(lambda: any('refuses to plan' in each for each in messages(health)))
@@ -107,11 +113,7 @@ def test_finding_37_an_allocator_resumes_planning_when_the_other_origin_disappea
 
 
 def test_while_origins_differ_holds_are_published_and_orders_by_lists_are_refused(start, probe):
-    fleet = Fleet(probe)
-    other = publish_origin_first(probe)
-    node = begin(start, fleet)
-    probe.until(lambda: 'refuses to plan: fleet_origin' in node.output())
-    fleet.uav('a', 0.0)
+    fleet, other, node = in_conflict(start, probe)
     holds = probe.collect(m.UavHold, 'a/hold', LATCHED)
 
     def paused():

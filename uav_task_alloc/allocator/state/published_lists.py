@@ -25,6 +25,7 @@ class PublishedLists:
     def __init__(self, lists: Iterable[UavList] = (), tasks: Iterable[str] = ()) -> None:
         self.lists = {each.uav: each for each in lists}
         self.unsaved: set[str] = set()  # not yet on disk
+        self.to_resend = {*self.lists}  # UAVs whose lists are to be published again
         self.foreign = False  # a UAV had a list that this allocator did not publish
         # revisions of the previous run, and of another allocator: their tasks are unknown
         self._previous = {each.uav: each.revision for each in self.lists.values()}
@@ -65,6 +66,7 @@ class PublishedLists:
                           stamp=stamp)
         self.lists[new.uav] = revised
         self.unsaved.add(new.uav)
+        self.to_resend.discard(new.uav)
         if revised.stops:
             self._had_tasks.add(new.uav)
         for task_id in revised.task_ids:
@@ -86,19 +88,19 @@ class PublishedLists:
         if revision > most:
             raise InvalidValue(f'uav {uav_id}: list_revision', revision, f'at most {most}')
 
-    def raise_revision(self, uav_id: str, revision: int) -> bool:
-        """Continue from the revision that a UAV holds; returns whether it is above the known one.
+    def raise_revision(self, uav_id: str, revision: int) -> None:
+        """Continue from the revision that a UAV holds, and resend its list if that is above it.
 
         Such a list is of a previous run, or of another allocator.
         """
         published = self.get(uav_id)
         self._on_board[uav_id] = revision
         if revision <= published.revision:
-            return False
+            return
         self.foreign = True
+        self.to_resend.add(uav_id)
         self.lists[uav_id] = replace(published, revision=revision)
         self._foreign_revisions[uav_id] = revision
-        return True
 
     def contained(self, uav_id: str, task_id: str, revision: int) -> bool:
         """Return whether that revision of a UAV's list contained a task, as far as is known.
@@ -158,6 +160,7 @@ class PublishedLists:
     def forget_uav(self, uav_id: str) -> None:
         """Remove a UAV; if it reports again its revisions still increase."""
         self._on_board.pop(uav_id, None)
+        self.to_resend.discard(uav_id)
         published = self.lists.pop(uav_id, None)
         if published is None:
             return

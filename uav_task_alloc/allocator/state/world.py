@@ -92,7 +92,6 @@ class World:
         self.kernels_ready = False  # compiled: checks of zones are fast
         self._paths: SafePaths | None = None
         self._paths_params = params
-        self._resend = {each.uav for each in saved.lists}  # UAVs whose lists are resent
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
         self.stuck: frozenset[str] = frozenset()  # UAVs that hold for one that holds for them
@@ -118,7 +117,7 @@ class World:
             self.tasks, self.works, self.deadlines, self.ground, self.note, self.request_replan,
             'restart' if saved.works else '', seen)
         self._events = TaskEvents(self.tasks, self.fleet, self.lists, self.request_replan,
-                                  self._resend.add, self.note)
+                                  self.lists.to_resend.add, self.note)
         self._missed = MissedCompletions(saved.lists, self.tasks, self.note)
 
     # inputs
@@ -162,8 +161,7 @@ class World:
         if before is None and (why := self.ground.differs(report)):
             self.note(why, warning=True)
         self.admission.confirm(report)
-        if self.lists.raise_revision(uav_id, report.list_revision):
-            self._resend.add(uav_id)
+        self.lists.raise_revision(uav_id, report.list_revision)
         if self.kernels_ready:
             self.zone_checks.check_reported(uav_id, now)
         return ''
@@ -249,7 +247,6 @@ class World:
 
     def forget_uav(self, uav_id: str) -> None:
         """Remove a UAV with its list, its row in the journal and its publishers."""
-        self._resend.discard(uav_id)
         self.outbox.lists.pop(uav_id, None)
         self.outbox.forgotten.add(uav_id)
         self.fleet.forget(uav_id)
@@ -362,7 +359,6 @@ class World:
         revised = [self.lists.publish(each, stamp, resend) for each in lists.values()]
         published = {each.uav: each for each in revised if each}
         self.outbox.lists.update(published)
-        self._resend.difference_update(published)
         return list(published)
 
     def shortened_lists(self, stamp: float) -> dict[str, UavList]:
@@ -376,7 +372,7 @@ class World:
     def lists_to_resend(self, stamp: float) -> dict[str, UavList]:
         """Return the lists to publish again; one with a later ended task waits for a plan."""
         return {uav_id: self.lists.restamped(uav_id, stamp, self.flights.of(uav_id, stamp))
-                for uav_id in sorted(self._resend)
+                for uav_id in sorted(self.lists.to_resend)
                 if not any(map(self._ended, self.lists.get(uav_id).task_ids))}
 
     def _ended(self, task_id: str) -> bool:

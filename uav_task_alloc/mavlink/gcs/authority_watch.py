@@ -64,11 +64,11 @@ class AuthorityWatch:
         self._hand_over = HandOver(state, evidence, policy)
         self._grant = TakeoffGrant(state, policy)
         self._climb = ClimbCheck(state, evidence)
+        self.continues_climb = False
         # ArduPilot, in GUIDED: nothing else shows that it still climbs
-        climb = None if record is None or profile.takeoff_mode is not None else record.climb
-        self.continues_climb = climb is not None and record is not None and record.armed
-        if self.continues_climb and climb is not None:
-            self._climb.begin(climb)
+        if record and record.armed and record.climb is not None and profile.takeoff_mode is None:
+            self.continues_climb = True
+            self._climb.begin(record.climb)
         self._recorder = AuthorityRecorder(state, evidence, record, save)
 
     @property

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from uav_task_alloc.mavlink.gcs.clock_rate import ClockRate
 
 _RESTART_STEP = 2000  # [ms] decrease of time_boot_ms that shows a restart, not a late message
+CLOCK_TIME = 3.0  # [s] in which a message with the clock comes, as a rule
 _MAX_DELAY = 6.0  # [s] of a late message
 _CATCH_UP = 1.0  # [s] in which a link delivers what it has buffered in a silence
 

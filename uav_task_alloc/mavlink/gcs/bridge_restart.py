@@ -9,6 +9,7 @@ from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent
 from uav_task_alloc.mavlink.gcs.authority_recorder import LANDING_RADIUS
 from uav_task_alloc.mavlink.gcs.authority_state import UNUSABLE, AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
+from uav_task_alloc.mavlink.gcs.boot_clock import CLOCK_TIME
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass
 from uav_task_alloc.mavlink.gcs.hand_over import REST_SPEED
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
@@ -19,7 +20,6 @@ _BRAKING_TIME = 10.0  # [s] from the HOLD command until the vehicle is at rest
 _CLIMB_ERROR = 0.1  # of the height of a take-off, by which its end differs at most
 # vehicle time, and east and north, of the newest position in `AuthorityRecord.seen`
 _TIME, _PLACE = -7, slice(-6, -4)
-_CLOCK_TIME = 3.0  # [s] in which a message with the clock of the vehicle comes
 _FRESH = 3.0  # [s] since a heartbeat that still shows the present mode
 _DRIFT = 5.0  # [m] from home at most where a take-off ends
 
@@ -66,7 +66,7 @@ class BridgeRestart:
             self._await_battery_change(record)
             return
         rebooted = self._rebooted(record)
-        self._awaits_clock = rebooted is None and now - self._first_at < _CLOCK_TIME
+        self._awaits_clock = rebooted is None and now - self._first_at < CLOCK_TIME
         if self._awaits_clock:
             return
         if rebooted is None:

@@ -14,10 +14,10 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import (
     AuthorityWatchState,
     UnexplainedChange,
 )
+from uav_task_alloc.mavlink.gcs.boot_clock import CLOCK_TIME
 from uav_task_alloc.mavlink.gcs.link_times import STALE
 from uav_task_alloc.mavlink.gcs.telemetry import UNKNOWN
 
-_CLOCK_TIME = 3.0  # [s] in which a message with the clock comes
 _SAME_CLOCK = 8000.0  # [ms] by which the clock of one vehicle differs at most, with late messages
 _SAME_PLACE, _FASTEST = 100.0, 40.0  # [m], and [m/s], by which its place differs at most
 _HEARTBEAT_DELAY = 1.0  # [s]; one received later than that after a boot was sent after it
@@ -103,7 +103,7 @@ class LinkLoss:
         """
         state, telemetry = self._state, self._state.telemetry
         known = telemetry.boot_ms > 0 and telemetry.has_position
-        if not known and now - self._moved_at < _CLOCK_TIME:
+        if not known and now - self._moved_at < CLOCK_TIME:
             return True
         self._forecast = None
         reach = _SAME_PLACE + _FASTEST * (now - self._position_at)
