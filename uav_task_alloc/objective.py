@@ -159,12 +159,14 @@ def check_objective(objective: Objective | str) -> Objective:
     return OBJECTIVES[objective]
 
 
-def response_time(tasks: Iterable[Task], starts: Mapping[str, float]) -> float:
+def response_time(tasks: Iterable[Task], starts: Mapping[str, float], *,
+                  from_now: bool = False) -> float:
     """Value-weighted mean time from the announcements to the starts of the services [s].
 
     Args:
         tasks: all, also those not served.
         starts: of the services [s], by id of each task served.
+        from_now: count from time 0 instead, without what tasks have waited already.
 
     Returns:
         The sum of value * (start - announced) over the tasks served, by the value of all tasks: so
@@ -172,7 +174,7 @@ def response_time(tasks: Iterable[Task], starts: Mapping[str, float]) -> float:
     """
     known = list(tasks)
     total = math.fsum(task.value for task in known)
-    return math.fsum(task.value * (starts[task.id] - task.announced)
+    return math.fsum(task.value * (starts[task.id] - (0.0 if from_now else task.announced))
                      for task in known if task.id in starts) / total if total > 0.0 else 0.0
 
 

@@ -63,8 +63,9 @@ class AllocatorParams(FrameParams):
                                      '`terrain`.', low=0.0, high=10000.0, unit='m')
     settle: float = param(0.05, 'Quiet time that ends a burst of events; one solve a burst.',
                           low=0.0, high=10.0, unit='s')
-    replan_margin: float = param(0.01, 'Share by which a plan must be shorter to replace the '
-                                 'one that is flown.', low=0.0, high=1.0)
+    replan_margin: float = param(0.01, 'Share of its cost by which a plan must be better to '
+                                 'replace the one that is flown; what tasks have waited already '
+                                 'does not count.', low=0.0, high=1.0)
     background_budget: float = param(0.05, 'Time of one search between events; 0: none.',
                                      low=0.0, high=10.0, unit='s')
     background_period: float = param(

@@ -141,10 +141,16 @@ class Allocator:
         world.orders.changed_holds.clear()
 
     def _watch_clock(self, now: float, stamp: float) -> None:
-        """After a jump of the published clock forget what was measured, and plan windows again."""
+        """After a jump of the published clock forget what was measured, and plan windows again.
+
+        A simulated clock is 0 until it begins: what was announced before is announced then.
+        """
         before, since = self._clock
         self._clock = stamp, now
-        if before <= 0.0 or before == math.inf:  # the first tick, or /clock has begun
+        if before <= 0.0 or before == math.inf:  # the first tick, or /clock may have begun
+            if stamp > 0.0:
+                self.world.tasks.clock_began(stamp)
+                self.world.announced.seen.clock_began(stamp)
             return
         if before - _CLOCK_STEP <= stamp <= before + _CLOCK_STEP + _FASTEST * (now - since):
             return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tasks: accepted, refused, changed, withdrawn, and how they end."""
 import pytest
-from allocation import AllocatorDriver
+from allocation import AllocatorDriver, task
 
 from uav_task_alloc.allocator.records import AnnouncementAction
 from uav_task_alloc.model import Task
@@ -100,6 +100,20 @@ def test_the_same_announcement_again_changes_nothing(driver):
     assert driver.world.tasks.records['t1'] == before
     assert driver.solves == [driver.solves[0]]
     assert 'ADD of t1 ignored: duplicate: announced before, unchanged' in ''.join(driver.notes)
+
+
+def test_what_is_announced_before_the_clock_begins_is_announced_when_it_begins():
+    driver = AllocatorDriver(anticipate='learnt')
+    driver.core.tick(driver.now, 0.0)
+    driver.world.announce(AnnouncementAction.ADD, [task(('t1', 100, 0))], 0.0, driver.now)
+    driver.core.tick(driver.now, 0.0)
+    assert driver.world.tasks.records['t1'].since == 0.0
+    driver.core.tick(driver.now, 1.8e9)
+    driver.world.announce(AnnouncementAction.ADD, [task(('t2', 100, 0))], 1.8e9 + 5.0, driver.now)
+    driver.core.tick(driver.now, 1.8e9 + 9.0)
+    assert [record.since for record in driver.world.tasks.records.values()] == [1.8e9, 1.8e9 + 5.0]
+    assert [row[0] for row in driver.world.announced.seen.seen] == [1.8e9, 1.8e9 + 5.0]
+    assert 't1' in driver.world.tasks.unsaved
 
 
 def test_another_task_under_a_known_id_is_refused_and_the_first_stays(driver):

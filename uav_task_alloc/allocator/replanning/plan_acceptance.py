@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
@@ -21,7 +22,8 @@ def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
     A change is accepted if it serves a higher value, or the same value at a cost of the objective
     that is lower by the margin: with that of distance, on routes so much shorter. UAVs that
     exchange tasks change together. Without an event the accepted changes together must lower the
-    cost of the whole plan by the margin, too.
+    cost of the whole plan by the margin, too. What tasks have waited already is no part of such a
+    cost: else no change would be worth it where tasks wait for hours.
 
     Args:
         answer: of the worker.
@@ -44,7 +46,10 @@ def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
     if not accepted or (answer.problem.background and not more
                         and first - cost <= margin * first):
         return repaired
-    return replace(_combined(answer, accepted), cost=cost)
+    chosen = _combined(answer, accepted)
+    waited = response_time(answer.problem.tasks, dict.fromkeys(
+        chain(*chosen.routes.values()), 0.0))
+    return replace(chosen, cost=cost + answer.problem.objective.response * waited)
 
 
 def _added_value(answer: ReplanAnswer, group: Collection[str]) -> float:
@@ -66,7 +71,7 @@ def _cost(answer: ReplanAnswer, changed: Collection[str],
 
 
 def plan_cost(problem: ReplanProblem, plan: Plan, only: Collection[str] | None = None) -> float:
-    """Return the cost of the objective of a plan.
+    """Return the cost of the objective of a plan, in which tasks wait from now on.
 
     Args:
         problem: from now.
@@ -87,7 +92,7 @@ def plan_cost(problem: ReplanProblem, plan: Plan, only: Collection[str] | None =
     return prices.cost(
         metres, max((end for uav_id, end in times.ends.items() if uav_id in ids), default=0.0),
         response_time(problem.tasks, {task: start for task, start in times.starts.items()
-                                      if task in mine}),
+                                      if task in mine}, from_now=True),
         math.fsum(late for task, late in times.late.items() if task in mine))
 
 

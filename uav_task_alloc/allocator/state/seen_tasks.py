@@ -63,6 +63,20 @@ class SeenTasks:
         self.unsaved.add(number)
         self.version += 1
 
+    def clock_began(self, stamp: float) -> None:
+        """Date what was announced while the clock was 0 from its first time.
+
+        Args:
+            stamp: [s] clock of the node.
+        """
+        dated = {number: [row if row[0] != 0.0 else (stamp, *row[1:]) for row in rows]
+                 for number, rows in self.blocks.items()}
+        if dated != self.blocks:
+            self.unsaved.update(self.blocks)
+            self.blocks = dated
+            self.version += 1
+            self.forgotten += 1  # what was learnt of them is learnt again
+
     def forget(self) -> int:
         """Forget all of them; returns how many there were."""
         count = len(self.seen)

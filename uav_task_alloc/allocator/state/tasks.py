@@ -121,6 +121,12 @@ class TaskRegistry:
             self._put(replace(known, stamp=stamp, **changes))
         return ''
 
+    def clock_began(self, stamp: float) -> None:
+        """Date tasks that were announced while the clock was 0 from its first time."""
+        for record in list(self.records.values()):
+            if record.since == 0.0:
+                self._put(replace(record, since=stamp, stamp=max(record.stamp, stamp)))
+
     def reject(self, task_id: str, reason: str, stamp: float) -> TaskVerdict:
         """Refuse a task; its status is REJECTED unless an accepted task has that id."""
         if task_id not in self.records:
