@@ -44,6 +44,18 @@ def test_the_first_tasks_of_a_uav_need_approval_only_with_all(driver):
     assert driver.allocations[-1].trigger == 'plan 1 accepted by ann'
 
 
+@pytest.mark.parametrize('route_end', ['hold', 'home'])
+def test_what_asks_nothing_of_a_uav_needs_no_approval(route_end):
+    driver = make('all', route_end=route_end)
+    driver.settle()
+    assert driver.proposals == []
+    driver.add(('t1', 100, 0))
+    driver.settle()
+    proposal, = driver.proposals
+    assert [each.uav for each in proposal.lists] == ['a']
+    assert len(proposal.changes) == 2
+
+
 def test_a_new_plan_is_proposed_and_the_fleet_flies_on(driver):
     driver.add(('t4', 300, 0))
     driver.settle()

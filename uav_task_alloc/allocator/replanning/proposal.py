@@ -56,6 +56,8 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
     for group in exchange_groups(before, after):
         why = next(filter(None, map(world.why_change, sorted(group))), '')
         first = not any(before.get(uav_id) for uav_id in group)
+        if all(world.lists.is_void(built.lists[uav_id]) for uav_id in group):
+            continue
         if why:
             reasons.update(dict.fromkeys(sorted(group), why))
         elif not (first and world.params.approval == 'replan'):
@@ -188,7 +190,7 @@ def _proposal(world: World, chosen: Plan, built: BuiltLists, held: Iterable[str]
     late = {task_id: by for task_id, by in chosen.timetable().late.items() if any(
         task_id in each.task_ids for each in new.values())}
     owner = {task_id: uav_id for uav_id, ids in before.items() for task_id in ids}
-    changes = [_change(uav_id, before.get(uav_id, ()), each.task_ids, owner, metres[uav_id])
+    changes = [_change(each, before.get(uav_id, ()), owner, metres[uav_id])
                for uav_id, each in new.items()]
     changes += [f'in all {distance:+.0f} m, the last UAV ends {finish:+.0f} s']
     changes += [f'late: {first_of(f"{task_id} by {by:.0f} s" for task_id, by in late.items())}'
@@ -200,9 +202,10 @@ def _proposal(world: World, chosen: Plan, built: BuiltLists, held: Iterable[str]
                     {uav_id: built.later[uav_id] for uav_id in new if uav_id in built.later})
 
 
-def _change(uav_id: str, before: tuple[str, ...], after: tuple[str, ...],
-            owner: Mapping[str, str], metres: float) -> str:
+def _change(new: UavList, before: tuple[str, ...], owner: Mapping[str, str],
+            metres: float) -> str:
     """What one UAV gains and loses."""
+    after = new.task_ids
     gains = [f'{task_id} from {owner[task_id]}' if task_id in owner else f'{task_id} (new)'
              for task_id in after if task_id not in before]
     loses = [task_id for task_id in before if task_id not in after]
@@ -210,7 +213,8 @@ def _change(uav_id: str, before: tuple[str, ...], after: tuple[str, ...],
              for word, tasks in (('gains', gains), ('loses', loses)) if tasks]
     kept = ([t for t in before if t in after], [t for t in after if t in before])
     parts += ['flies its tasks in another order'] if kept[0] != kept[1] else []
-    return (f'{uav_id} {", ".join(parts)}: {len(before)} -> {len(after)} tasks, '
+    parts = parts or ['returns home' if new.returns else 'holds']
+    return (f'{new.uav} {", ".join(parts)}: {len(before)} -> {len(after)} tasks, '
             f'{metres:+.0f} m')
 
 

@@ -60,7 +60,7 @@ class PublishedLists:
         published = self.get(new.uav)
         if not resend and (new is published or new.same_route(published)):
             return None
-        if not (new.stops or new.end_via) and published.revision == 0 and not resend:
+        if self.is_void(new) and not resend:
             return None
         revised = replace(new, revision=(published.revision or self._revision_floor) + 1,
                           stamp=stamp)
@@ -87,6 +87,14 @@ class PublishedLists:
         most = max(self.get(uav_id).revision, _MOST_FOREIGN)
         if revision > most:
             raise InvalidValue(f'uav {uav_id}: list_revision', revision, f'at most {most}')
+
+    def is_void(self, new: UavList) -> bool:
+        """Return whether a list asks nothing of a UAV that has had none.
+
+        Args:
+            new: that may be published.
+        """
+        return not (new.stops or new.end_via) and self.get(new.uav).revision == 0
 
     def raise_revision(self, uav_id: str, revision: int) -> None:
         """Continue from the revision that a UAV holds, and resend its list if that is above it.
