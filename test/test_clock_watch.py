@@ -2,7 +2,7 @@
 """Simulated time that is missing, stands still, jumps or goes back: one line each."""
 import pytest
 
-from uav_task_alloc.nodes.ros.clock_watch import ClockWatch, SteadyTime
+from uav_task_alloc.nodes.ros.clock_watch import ClockOffsets, ClockWatch, SteadyTime
 
 
 def lines(*readings):
@@ -46,3 +46,29 @@ def test_recorded_time_goes_on_where_the_clock_goes_back():
     assert [time.at(ros) for ros in (10.0, 12.0, 5.0, 6.0, 5.5, 7.0)] == [
         10.0, 12.0, 12.0, 13.0, 13.0, 14.5]
     assert time.offset == 7.5
+
+
+def test_a_sender_with_another_clock_is_named_until_it_agrees_or_is_gone():
+    offsets = ClockOffsets('reports')
+    for k in range(3):
+        assert offsets.warning(k) == ''
+        offsets.add('uav_1', 1000.0 + k + 37.0, 1000.0 + k, k)
+        offsets.add('uav_2', 1000.0 + k - 4.0, 1000.0 + k, k)
+    assert offsets.warning(3.0) == (
+        'reports of uav_1 are stamped 37 s after the clock of this node: expected machines whose '
+        'clocks agree')
+    for k in range(3):
+        offsets.add('uav_2', 900.0 + k, 1000.0 + k, k)
+    assert offsets.warning(3.0).startswith(
+        'reports of uav_2 (and those of 1 more) are stamped 100 s before')
+    assert offsets.warning(13.0) == ''
+    offsets.add('uav_2', 1003.0, 1003.0, 3.0)
+    assert 'uav_2' not in offsets.warning(4.0)
+
+
+@pytest.mark.parametrize(('stamp', 'clock'), [(0.0, 1e9), (1e9, 0.0)])
+def test_what_has_no_time_has_no_offset(stamp, clock):
+    offsets = ClockOffsets('reports')
+    for k in range(9):
+        offsets.add('uav_1', stamp, clock, k)
+    assert offsets.warning(9.0) == ''

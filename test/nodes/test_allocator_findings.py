@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Findings 23 and 24 with real nodes: journals of another origin, UAVs that are forgotten."""
 import pytest
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import Header
 from test_allocator import Fleet, add, begin, task
 
 from uav_task_alloc.allocator.core import make_safe_paths
@@ -31,6 +34,15 @@ def test_finding_23_a_journal_of_another_origin_ends_the_start(start, probe, fle
     assert 'is of origin latitude 47.5' in other.output()
     assert 'expected that of the parameters, origin latitude 46.5' in other.output()
     assert 'Traceback' not in other.output()
+
+
+def test_diagnostics_name_a_uav_of_a_machine_with_another_clock(start, probe, fleet):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    begin(start, fleet)
+    ahead = probe.node.get_clock().now().seconds_nanoseconds()[0] + 3600
+    fleet.uav('a', 0.0, header=Header(stamp=Time(sec=ahead)))
+    probe.until(lambda: any('reports of a are stamped 3' in row.message
+                            for msg in health for row in msg.status))
 
 
 def test_finding_24_the_publishers_of_a_forgotten_uav_are_destroyed(probe):

@@ -40,7 +40,7 @@ from uav_task_alloc.nodes.conversions.messages import (
 )
 from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
 from uav_task_alloc.nodes.ros.batched_subscription import subscribe_batched
-from uav_task_alloc.nodes.ros.clock_watch import watch_clock
+from uav_task_alloc.nodes.ros.clock_watch import ClockOffsets, is_simulated, watch_clock
 from uav_task_alloc.nodes.ros.leader_election import LeaderElection
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.order_services import OrderServices
@@ -51,6 +51,7 @@ from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.record.message_records import from_stamp
 from uav_task_alloc.zone_codec import decode_zone_array
 
 _STEP_PERIOD = 0.025  # [s]
@@ -109,6 +110,7 @@ class AllocatorNode(Node):
         self.result_ready = self.create_guard_condition(self.on_results)
         self.subscribers_by = time.monotonic() + _SUBSCRIBER_TIMEOUT
         watch_clock(self, self.get_logger().warning)
+        self.offsets = ClockOffsets('reports')
         self.worker = Worker(self.load_solver, self.solve, self.deliver, self.on_solver_error)
         self.worker.start()
 
@@ -164,10 +166,12 @@ class AllocatorNode(Node):
     def on_state(self, msg: m.UavState) -> None:
         """Take the state of a UAV."""
         try:
-            report = to_report(msg)
+            report, now, stamp = to_report(msg), time.monotonic(), self.stamp()
             check_topic(self, TASK_LIST, report.uav_id)
-            if self.world.update_uav(report, time.monotonic(), self.stamp()):
+            if self.world.update_uav(report, now, stamp):
                 return  # there are too many UAVs, which the world reports once
+            if not is_simulated(self):  # that clock is late, by as much as it is faster
+                self.offsets.add(report.uav_id, from_stamp(msg.header.stamp), stamp, now)
             refusal = ''
         except InvalidValue as error:
             refusal = str(error)
@@ -350,6 +354,7 @@ class AllocatorNode(Node):
             self.get_logger().error(stopped if conflict else 'fleet_origin: all agree')
         warnings = health_warnings(self.world, self.persistence.error, self.solver_error,
                                    self.stamp())
+        warnings += filter(None, [self.offsets.warning(time.monotonic())])
         self.diagnostics.publish(from_diagnostics([allocator_row(
             self.get_fully_qualified_name(), [stopped] if stopped else warnings,
             {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts(),

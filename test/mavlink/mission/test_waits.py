@@ -123,6 +123,14 @@ def test_on_the_ground_the_take_off_is_later_and_no_item_waits():
     assert waits.grounded(1030.0) == ''
 
 
+def test_a_take_off_waits_as_long_by_a_clock_that_is_behind_that_of_the_allocator():
+    waits = Waits()
+    tasks = timed('AB', stamp=1000.0, waits=[60.0, 0.0], begins=[1080.0, 1100.0])
+    waits.assign(tasks, set(), False, None)
+    assert waits.grounded(700.0) == waits.grounded(759.9) == 'its departure: task A begins later'
+    assert waits.grounded(760.0) == waits.grounded(690.0) == ''
+
+
 def clocked(bench, offset=1000.0):
     """Let ROS time pass with the bench, from 1000 s on."""
     executor = bench.executor()

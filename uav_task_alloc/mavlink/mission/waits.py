@@ -40,6 +40,7 @@ class Waits:
     def __init__(self) -> None:
         self.version = 0  # of the holds
         self.take_off: tuple[float, float, str] | None = None  # from, until [ROS s]; the task
+        self._seen: float | None = None  # [ROS s] when `grounded` was first asked about it
         self._waits: dict[str, _Wait] = {}  # by task id
         self._tasks = TaskList(0)
 
@@ -53,7 +54,8 @@ class Waits:
             airborne: whether the vehicle flies.
             active: the item being flown; None: not known.
         """
-        waits, self.take_off, last = {}, None, None
+        waits, last = dict[str, _Wait](), None
+        self.take_off = self._seen = None
         for stop in tasks.stops:
             if stop.task.id in done:
                 continue
@@ -122,10 +124,16 @@ class Waits:
         return replace(tasks, stops=tuple(stops))
 
     def grounded(self, clock: float) -> str:
-        """What a vehicle on the ground waits for at ROS time `clock` [s]; '': nothing."""
+        """What a vehicle on the ground waits for at ROS time `clock` [s]; '': nothing.
+
+        Where the clock of the allocator is ahead, the wait begins now.
+        """
         if self.take_off is None:
             return ''
         since, until, task = self.take_off
+        self._seen = clock if self._seen is None else self._seen
+        if self._seen < since - WAIT_TOLERANCE:
+            since, until = self._seen, self._seen + until - since
         # a clock that went back says nothing about the departure
         waits = since - WAIT_TOLERANCE <= clock < until and math.isfinite(until)
         return f'its departure: task {task} begins later' if waits else ''

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Logs once each that simulated time is missing, stands still, jumps or goes back."""
+"""Simulated time that is missing, stands still, jumps or goes back; machines with other clocks."""
 from __future__ import annotations
 
 import time
@@ -14,6 +14,7 @@ _PERIOD = 0.2  # [s] between two comparisons
 _PATIENCE = 5.0  # [s] of steady time until a clock that does not move is logged
 _FASTEST = 200.0  # times real time; a step that is longer is a jump
 _STEP = 5.0  # [s] that any two readings may be apart
+_SEVERAL, _RECENT = 3, 10.0  # messages in a row, and [s] since the last, that make an offset
 
 
 class ClockWatch:
@@ -48,6 +49,48 @@ class ClockWatch:
         if before > 0.0 and ros - before > _STEP + _FASTEST * (steady - since):
             return f'/clock jumped forward by {ros - before:.1f} s, to {ros:.1f} s'
         return f'/clock runs again after {steady - since:.0f} s' if still else ''
+
+
+class ClockOffsets:
+    """Compares the stamps of messages with the clock of the node that receives them.
+
+    Args:
+        what: the messages of a sender, as in `reports`.
+
+    Arguments of methods:
+        steady: [s].
+    """
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._far: dict[str, tuple[int, float, float]] = {}  # count, offset [s], steady time [s]
+
+    def add(self, sender: str, stamp: float, clock: float, steady: float) -> None:
+        """Compare the stamp of a message with the clock of the node.
+
+        Args:
+            sender: of the message.
+            stamp: [s] of the message; 0: it has none.
+            clock: [s] of the node; 0: it has not begun.
+            steady: see the class.
+        """
+        offset = stamp - clock
+        if stamp <= 0.0 or clock <= 0.0 or abs(offset) <= _STEP:
+            self._far.pop(sender, None)
+        else:
+            self._far[sender] = self._far.get(sender, (0, 0.0, 0.0))[0] + 1, offset, steady
+
+    def warning(self, steady: float) -> str:
+        """Return whose clock is another one; '' where none is, or nobody has sent for a while."""
+        found = sorted((sender, offset) for sender, (count, offset, since) in self._far.items()
+                       if count >= _SEVERAL and steady - since <= _RECENT)
+        if not found:
+            return ''
+        sender, offset = max(found, key=lambda each: abs(each[1]))
+        more = f' (and those of {len(found) - 1} more)' if len(found) > 1 else ''
+        return (f'{self._what} of {sender}{more} are stamped {abs(offset):.0f} s '
+                f'{"after" if offset > 0.0 else "before"} the clock of this node: expected '
+                'machines whose clocks agree')
 
 
 class SteadyTime:
