@@ -5,7 +5,6 @@ No clock, no thread, no I/O: `now` is [s] of a steady clock, `stamp` [s] of the 
 """
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -78,7 +77,7 @@ class Allocator:
             stop.task.id for each in saved.lists for stop in each.stops if stop.reversed))
         self._learned = saved.learned
         self._learned_saved = now  # [s]
-        self._clock = math.inf, now  # published and steady clock [s] of the last tick
+        self._clock: tuple[float, float] | None = None  # published and steady [s], last tick
         self._publisher = PlanPublisher(self.world, self._best, now)
         # UAVs of the journal get time to report before they lose their tasks
         self._awaited = {each.uav for each in saved.lists if each.stops}
@@ -141,24 +140,29 @@ class Allocator:
         world.orders.changed_holds.clear()
 
     def _watch_clock(self, now: float, stamp: float) -> None:
-        """After a jump of the published clock forget what was measured, and plan windows again.
+        """After a jump of the published clock shift what is in force, and plan windows again.
 
         A simulated clock is 0 until it begins: what was announced before is announced then.
         """
-        before, since = self._clock
+        world, last = self.world, self._clock
         self._clock = stamp, now
-        if before <= 0.0 or before == math.inf:  # the first tick, or /clock may have begun
-            if stamp > 0.0:
-                self.world.tasks.clock_began(stamp)
-                self.world.announced.seen.clock_began(stamp)
+        if last is None:  # lists of the previous run may be of a later time
+            newest = max((each.stamp for each in world.lists.lists.values()), default=stamp)
+            last = max(newest, stamp), now
+        before, since = last
+        began = before <= 0.0 < stamp
+        if stamp > 0.0 and (began or since == now):
+            world.tasks.clock_began(stamp)
+            world.announced.seen.clock_began(stamp)
+        latest = before + _CLOCK_STEP + _FASTEST * (now - since)
+        if not began and before - _CLOCK_STEP <= stamp <= latest:
             return
-        if before - _CLOCK_STEP <= stamp <= before + _CLOCK_STEP + _FASTEST * (now - since):
-            return
-        self.world.flights.clock_jumped()
-        if not any(is_timed(record.task) for record in self.world.tasks.open()):
-            return
-        way = 'forward' if stamp > before else 'back'
-        self.world.request_replan(f'the clock jumped {way} by {abs(stamp - before):.1f} s', now)
+        for part in (world.flights, world.lists, self.approvals, self.separation):
+            part.clock_jumped(stamp - before)
+        if any(is_timed(record.task) for record in world.tasks.open()):
+            way = 'forward' if stamp > before else 'back'
+            world.request_replan('the clock has begun' if began else (
+                f'the clock jumped {way} by {abs(stamp - before):.1f} s'), now)
 
     def _check_hold(self, now: float) -> None:
         """End the hold after a restart when all awaited UAVs have reported for a while."""

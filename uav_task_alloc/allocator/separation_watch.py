@@ -89,6 +89,14 @@ class SeparationWatch:
                                        'other', now)
         return step
 
+    def clock_jumped(self, by: float) -> None:
+        """Shift since when UAVs are silent with the published clock.
+
+        Args:
+            by: [s] of the jump.
+        """
+        self._silent.update((uav_id, stamp + by) for uav_id, stamp in self._silent.items())
+
     def texts(self) -> dict[str, str]:
         """Return what is predicted for each UAV, by id."""
         found: dict[str, str] = {}
@@ -164,9 +172,7 @@ class SeparationWatch:
         if not record.silent:
             self._silent.pop(uav_id, None)
             return 0.0
-        if self._silent.setdefault(uav_id, stamp) > stamp:  # the clock jumped back
-            self._silent[uav_id] = stamp
-        return stamp - self._silent[uav_id]
+        return stamp - self._silent.setdefault(uav_id, stamp)
 
     def _flying(self, uav_id: str, record: UavRecord, flight: UavFlight, stamp: float
                 ) -> MonitoredUav:

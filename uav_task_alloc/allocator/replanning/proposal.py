@@ -13,6 +13,7 @@ from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, exchange_groups
 from uav_task_alloc.allocator.replanning.planning import BuiltLists, build_lists
+from uav_task_alloc.allocator.state.published_lists import shifted_list
 from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import first_of
@@ -314,6 +315,18 @@ class Approvals:
     def accept(self, operator: str) -> None:
         """Close the open proposal, whose lists are put in force."""
         self._close(f'accepted by {operator}' if operator else 'accepted: its time is over')
+
+    def clock_jumped(self, by: float) -> None:
+        """Shift the deadline and the lists of the open proposal with the published clock.
+
+        Args:
+            by: [s] of the jump.
+        """
+        known = self._world.proposal
+        if known is not None:
+            self._set(replace(
+                known, stamp=known.stamp + by, deadline=known.deadline + by,
+                lists=tuple(shifted_list(each, by) for each in known.lists)))
 
     def expired(self, stamp: float) -> bool:
         """Return whether the time of the open proposal is over."""

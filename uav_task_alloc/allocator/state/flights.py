@@ -199,14 +199,19 @@ class Flights:
             self._legs[uav_id] = _Leg(following.task.id, stamp, seconds, pace.corners(way),
                                       following.task.stay, predicted)
 
-    def clock_jumped(self) -> None:
-        """Drop what was measured across a jump of the published clock."""
+    def clock_jumped(self, by: float) -> None:
+        """Drop what was measured across a jump of the published clock, and shift the rest.
+
+        Args:
+            by: [s] of the jump.
+        """
         self._legs.clear()
         self._waits.clear()
         self._sampled.clear()
-        self._reached.clear()
-        self._landed.clear()
-        self._reported.clear()
+        self._reached = {uav_id: (task_id, stamp + by)
+                         for uav_id, (task_id, stamp) in self._reached.items()}
+        for stamps in (self._landed, self._reported):
+            stamps.update((uav_id, stamp + by) for uav_id, stamp in stamps.items())
 
     def forget(self, uav_id: str) -> None:
         """Drop what is kept of a UAV."""

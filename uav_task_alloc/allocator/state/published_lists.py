@@ -88,6 +88,18 @@ class PublishedLists:
         if revision > most:
             raise InvalidValue(f'uav {uav_id}: list_revision', revision, f'at most {most}')
 
+    def clock_jumped(self, by: float) -> None:
+        """Shift the times of all lists with the published clock; those with waits are sent again.
+
+        Args:
+            by: [s] of the jump.
+        """
+        for uav_id, each in self.lists.items():
+            self.lists[uav_id] = shifted_list(each, by)
+            self.unsaved.add(uav_id)
+            if any(stop.begin_after for stop in each.stops):
+                self.to_resend.add(uav_id)
+
     def is_void(self, new: UavList) -> bool:
         """Return whether a list asks nothing of a UAV that has had none.
 
@@ -186,6 +198,18 @@ class PublishedLists:
         self._contained = {key: span for key, span in self._contained.items()
                            if key[1] not in task_ids}
         self._known_tasks.difference_update(task_ids)
+
+
+def shifted_list(each: UavList, by: float) -> UavList:
+    """Return a list with times of a published clock that has jumped.
+
+    Args:
+        each: list.
+        by: [s] of the jump.
+    """
+    return replace(each, stamp=each.stamp + by, stops=tuple(
+        replace(stop, begin_after=stop.begin_after + by) if stop.begin_after else stop
+        for stop in each.stops))
 
 
 def _later(stops: Sequence[ListStop], seconds: float) -> tuple[ListStop, ...]:
