@@ -137,7 +137,11 @@ class SeparationWatch:
 
     def _note_lists(self) -> None:
         """Keep the list that a UAV reports to be on board, and those that may follow it."""
-        for uav_id, record in self._world.uav_records().items():
+        records = self._world.uav_records()
+        for uav_id in (self._sent.keys() | self._silent.keys()) - records.keys():
+            self._sent.pop(uav_id, None)
+            self._silent.pop(uav_id, None)
+        for uav_id, record in records.items():
             kept, current = self._sent.setdefault(uav_id, {}), self._world.list_of(uav_id)
             kept[current.revision] = current
             reported = record.report.list_revision

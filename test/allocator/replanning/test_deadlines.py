@@ -207,6 +207,18 @@ def test_a_wait_that_changes_is_sent_again_and_small_changes_are_not():
     assert made.lists['a'].stops[1].wait == pytest.approx(103.0 - 6.0, abs=0.5)
 
 
+def test_a_wait_that_is_far_away_is_sent_again_only_for_a_greater_change():
+    made = driver()
+    uav(made, 'a', 0)
+    made.add(at('t1', 500), at('t2', 900, earliest=made.now + 2000.0))
+    made.settle()
+    sent = made.lists['a'].revision
+    report(made, {'a': (0, 0)}, seconds=35.0)
+    assert made.lists['a'].revision == sent
+    report(made, {'a': (0, 0)}, seconds=10.0)
+    assert made.lists['a'].revision == sent + 1
+
+
 def test_the_announcement_of_a_task_survives_a_restart():
     made = driver()
     made.add(at('t', 10))

@@ -320,6 +320,19 @@ def test_ended_work_is_forgotten_as_a_whole():
     assert rows['task', 'field#1'] is None
 
 
+def test_points_are_forgotten_beside_open_work_with_more_flown_pieces():
+    driver = fleet(keep_ended=1)
+    driver.add(FIELD)
+    driver.settle()
+    fly(driver, 'a', len(route(driver, 'a')))
+    assert status(driver).pieces_done > 1
+    for k in range(3):
+        driver.add((f't{k}', 0, 0))
+        driver.cancel(f't{k}')
+    driver.settle()
+    assert {name for name in driver.world.tasks.records if name.startswith('t')} == {'t2'}
+
+
 def test_parts_of_a_way_that_are_flown_are_taken_out():
     way = ((0.0, 0.0, 50.0), (100.0, 0.0, 50.0), (100.0, 50.0, 50.0))
     assert unflown_parts(way, []) == [way]

@@ -18,7 +18,8 @@ from uav_task_alloc.timetable import clock_text
 _LATE = 0.25  # [s] after its latest that is no rounding
 _NEWS = 2.0  # [s] change of an expected start that is published
 _SHARE = 0.05  # of the time until it, where that is longer
-_MORE = 5.0  # [s] change of a lateness that is reported again
+_MORE = 5.0  # [s] change of a lateness that is reported again, or of a wait that is sent again
+_OF_WAIT = 0.02  # of the time until the service, where that is longer
 # of the solver, which counts from now
 _ARRIVAL = re.compile(r'latest -?\d+ s; the earliest arrival is ')
 _EACH = re.compile(r'arrives at (-?\d+) s, its latest is -?\d+ s')
@@ -219,7 +220,7 @@ def without_jitter(published: UavList, now: UavList) -> bool:
 
     Returns:
         False where a wait, or the start of the first service after one, has changed by more than
-        5 s.
+        5 s, and by more than 2 % of the time until the service.
     """
     for k, (old, new) in enumerate(zip(published.stops, now.stops, strict=True)):
         if old.wait == new.wait == 0.0:
@@ -228,6 +229,6 @@ def without_jitter(published: UavList, now: UavList) -> bool:
             change = published.stamp + old.start - now.stamp - new.start
         else:
             change = old.wait - new.wait
-        if abs(change) > _MORE:
+        if abs(change) > max(_MORE, _OF_WAIT * new.start):
             return False
     return True

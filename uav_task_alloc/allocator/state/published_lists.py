@@ -206,6 +206,9 @@ def shifted_list(each: UavList, by: float) -> UavList:
     Args:
         each: list.
         by: [s] of the jump.
+
+    Returns:
+        The list with its stamp and its waits moved by as much.
     """
     return replace(each, stamp=each.stamp + by, stops=tuple(
         replace(stop, begin_after=stop.begin_after + by) if stop.begin_after else stop

@@ -160,7 +160,9 @@ class TaskRegistry:
         Returns:
             The ids removed.
         """
-        old = set(list(self.ended)[:max(0, len(self.ended) - keep)]) - set(listed)
+        kept = set(listed)
+        free = [task_id for task_id in self.ended if task_id not in kept]
+        old = set(free[:max(0, len(free) - keep)])
         self.forget(old)
         return old
 

@@ -92,6 +92,7 @@ class World:
         self.kernels_ready = False  # compiled: checks of zones are fast
         self._paths: SafePaths | None = None
         self._paths_params = params
+        self._kept = -1, -1  # `keep_ended`, and how many had ended when it was applied
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
         self.stuck: frozenset[str] = frozenset()  # UAVs that hold for one that holds for them
@@ -258,11 +259,13 @@ class World:
 
     def forget_ended(self) -> None:
         """Remove ended tasks beyond `keep_ended`."""
-        if len(self.tasks.ended) > self.params.keep_ended:
-            keep, listed = self.params.keep_ended, self.lists.owners()
+        keep, count = self.params.keep_ended, len(self.tasks.ended)
+        if count > keep and (keep, count) != self._kept:
+            listed = self.lists.owners()
             gone = self.works.forget_ended(keep, listed)
             self.lists.forget_tasks(gone | self.tasks.forget_ended(
                 keep, {*listed, *self.works.all_pieces()}))
+            self._kept = keep, len(self.tasks.ended)
 
     # questions of the planner
 
