@@ -274,3 +274,18 @@ def test_a_task_with_a_path_is_for_one_solver_only(solver):
     line = Task('line', (1.0, 0.0, 0.0), path=((1.0, 0.0, 0.0), (9.0, 0.0, 0.0)))
     with pytest.raises(InvalidValue, match='latest times, loads, paths'):
         quick([ONE], [line], solver=solver)
+
+
+@pytest.mark.parametrize('objective', ['distance', 'finish'])
+@pytest.mark.parametrize('limits', [{'altitude_max': 60.0}, {'altitude_max': 70.0}])
+def test_no_leg_leads_over_a_task_beyond_the_altitude_limits(objective, limits):
+    uav = Uav('u', (-44.08, -49.42, 34.77), range=350.0)
+    tasks = [Task('t0', (-21.74, -37.78, 68.24)), Task('t2', (-28.43, 30.32, 113.11)),
+             Task('t3', (-35.64, 31.79, 100.31), value=5.0)]
+    zones = [ThreatZone.cylinder('z0', (-40.5, 10.66), 14.2, 0.0, 60.0, margin=5.0),
+             ThreatZone.polygon('z2', [(-33.28, -10.12), (-36.75, -3.0), (-41.83, -15.69),
+                                       (-41.39, -18.08), (-35.52, -12.68)], 0.0, 200.0)]
+    found = plan([uav], tasks, zones, clearance=5.0, route_end='home', objective=objective,
+                 max_iterations=50, budget=60.0, **limits)
+    points = [point for leg in found.legs['u'] for point in leg.via]
+    assert all(point[2] <= limits['altitude_max'] for point in points)

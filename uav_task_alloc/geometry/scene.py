@@ -154,9 +154,12 @@ def _join(address: int, i: int, between: int) -> float:
         between: k << 32 | j.
 
     Returns:
-        Its length [m]; inf: they are not known, or have too many points.
+        Its length [m]; inf: they are not known, have too many points, or k is beyond the altitude
+        limits.
     """
     scene, k, j = scene_at(address), between >> 32, between & 0xFFFFFFFF
+    if not scene.limits[0] <= scene.xyz[k, 2] <= scene.limits[1]:
+        return np.inf
     path, onward = np.empty((2 * MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
     n, more = stored_path(scene, i, k, path), stored_path(scene, k, j, onward)
     if n == 0 or more == 0 or n + more > MAX_CORNERS or scene.location[k] == INSIDE:

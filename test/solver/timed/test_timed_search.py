@@ -3,6 +3,7 @@
 import math
 import random
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -362,3 +363,16 @@ def test_temperatures_follow_the_price_of_lateness_where_nothing_else_counts():
         scales.append(make_timed(make_problem(fleet, work, {}, Limits(), rules), {}).scale)
     assert scales[0] > 1.0  # at 15 m/s the nearest tasks are some seconds away
     assert scales[1] == pytest.approx(2.0 * scales[0])
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_tasks_of_little_value_are_flown_in_the_best_order(seed):
+    rng = random.Random(seed)
+    uav, *tasks = (make(name, (rng.uniform(-1e3, 1e3), rng.uniform(-1e3, 1e3), 30.0)) for make, name
+                   in [(Uav, 'u'), (Task, 't0'), (Task, 't1'), (Task, 't2'), (Task, 'other')])
+    tasks = [replace(tasks[0], value=100.0), *tasks[1:3],
+             replace(tasks[3], value=100.0, required_capabilities={'camera'})]
+    rules = {'objective': 'balanced', 'route_end': 'home', 'budget': 60.0}
+    best = min(plan([uav], tasks, locked={'u': order}, max_iterations=0, **rules).cost
+               for order in permutations(('t0', 't1', 't2')))
+    assert plan([uav], tasks, max_iterations=500, **rules).cost == pytest.approx(best)

@@ -23,6 +23,7 @@ from uav_task_alloc.solver.timed.rebuild import rebuild
 from uav_task_alloc.solver.timed.round import empty_round
 from uav_task_alloc.solver.timed.route_pool import combined, may_combine, route_pool
 from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
+from uav_task_alloc.solver.timed.ways import TURN_BIT
 
 LEAST_PRICE, MOST_PRICE = 0.1, 100.0  # of excess, over the first price
 DECISION = 0.02  # share of the budget after which the rounds in all are estimated
@@ -96,6 +97,8 @@ class TimedColony:
         self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy(),
                                       weight=arrays.weight.copy(), gaps=gaps)
         self.best = copy_incumbent(start)
+        if not problem.prizes:
+            self._let_none_be_cheap(start)
         self._params, self._scale = params, problem.scale
         self._goal, self._decided = problem.base.rules.objective, False
         self.routes = empty_timed_routes(self.arrays)
@@ -118,6 +121,16 @@ class TimedColony:
                             MAX_UNSERVED_GROWTH * arrays.unserved, params.absent,
                             params.skipped, params.by_value,
                             FEW_BLINKS if tasks <= FEW_TASKS else BLINK_RATE, problem.prizes)
+
+    def _let_none_be_cheap(self, start: Incumbent) -> None:
+        """Where all tasks are served, let each cost as much to leave out as the most valuable.
+
+        One of little value would cost less than to serve it, and no plan without it is better.
+        """
+        a, nodes = self.arrays, np.arange(self.arrays.uavs, self.arrays.ends)
+        prices = a.unserved[start.order[nodes] & ~TURN_BIT != nodes]
+        if prices.size and prices.size == np.count_nonzero(a.unserved):
+            np.maximum(a.unserved, prices.max(), out=a.unserved, where=a.unserved > 0.0)
 
     def _allow_excess(self) -> None:
         """Set prices of excess, which the best has none of, where it is not allowed so far."""

@@ -168,6 +168,7 @@ def _set_prices(problem: Problem, a: TimedArrays, scale: float) -> None:
         least = max(UNSERVED_LEGS * scale, 2.0 * far * goal.distance)
         price = values / values.mean() * max(least, _longest_cost(problem, a, far))
         a.unserved[:] = np.maximum(0.5 * price, price + announced) + goal.distance * a.way_length
+        a.unserved[~a.compatible.any(axis=(0, 1))] = 0.0
     a.price[:] = a.weight[4] if not problem.rules.hard else math.inf
     a.price[:2] = math.inf
 
