@@ -18,7 +18,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from uav_task_alloc.record.ground_truth import read_run, visits
+from uav_task_alloc.record.ground_truth import read_run
+from uav_task_alloc.record.piece_passes import served
 from uav_task_alloc.record.record_file import RECORD_FILE, read_lines
 from uav_task_alloc.scenario import load, to_yaml
 from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP, ScenarioWind
@@ -30,8 +31,7 @@ DEMO = Path(__file__).resolve().parents[1] / 'config/scenarios/demo.yaml'
 def start_errors(out: Path) -> list[float]:
     """Errors [s] of all services that had an expected start AHEAD before; late is positive."""
     state, truth = read_run(out)
-    reached = visits(truth, {name: task.position for name, task in state.tasks.items()},
-                     state.waited)
+    reached = served(state, truth)
     starts = {name: reached[name][0].wall - state.tasks[name].service
               for name in state.completed() if reached[name]}
     predicted: dict[str, float] = {}

@@ -25,10 +25,11 @@ def status(task, state, reason=''):
 
 
 def write_run(out, statuses, reached=PLACES, zones=(), solves=(100.0, 20.0, 30.0),
-              plans=('ab', 'ba', 'bac')):
+              plans=('ab', 'ba', 'bac'), announcements=()):
     """A run of one UAV from a to e and on, which reaches the items of `reached`."""
     lines = [{'kind': 'announcement', 'action': 'ADD', 'tasks': [
                  {'id': name, 'position': list(place)} for name, place in PLACES.items()]},
+             *announcements,
              {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in zones]}]
     lines += [{'kind': 'allocation', 'solve_ms': ms, 'trigger': 'x', 'lists': [
         {'uav': 'u1', 'tasks': [{'id': name} for name in names]}]}
@@ -94,6 +95,22 @@ def test_each_task_has_one_fate(run):
 
 def test_a_task_without_any_status_is_lost(run):
     assert run(ALL_DONE[:4])['lost'] == {'e': 'no status'}
+
+
+def announced(action, name):
+    task = {'id': name} if action == 'CANCEL' else {'id': name, 'position': list(PLACES[name])}
+    return {'kind': 'announcement', 'action': action, 'tasks': [task]}
+
+
+@pytest.mark.parametrize(('actions', 'state', 'lost'), [
+    (['CANCEL'], 'CANCELLED', []), (['CANCEL'], None, []), (['CANCEL'], 'COMPLETED', ['e']),
+    (['CANCEL'], 'ACTIVE', ['e']), (['CANCEL', 'ADD'], None, ['e'])])
+def test_a_task_is_cancelled_only_where_its_last_status_says_so(run, actions, state, lost):
+    more = [status('e', state)] if state else []
+    summary = run([*ALL_DONE[:4], *more], reached='abcd',
+                  announcements=[announced(action, 'e') for action in actions])
+    assert list(summary['lost']) == lost
+    assert summary['tasks_cancelled'] == 1 - len(lost)
 
 
 def test_a_task_flown_twice_is_listed(run):

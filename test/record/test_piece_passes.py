@@ -139,3 +139,14 @@ def test_a_short_way_that_is_crossed_on_the_way_elsewhere_is_not_flown():
     truth = flown((62, 10), (54, 70), (54, 100), (20, 40), (90, 43))
     [reached] = piece_passes(made, truth)['field#1']
     assert reached.wall > 60.0
+
+
+def test_a_task_above_the_ground_is_judged_at_the_place_in_the_list_of_its_uav():
+    made = RunState()
+    made.apply({'kind': 'announcement', 'wall': 0.0, 'action': 'ADD', 'tasks': [
+        {'id': 'a', 'position': [100.0, 0.0, 30.0], 'vertical': 'TERRAIN'}]})
+    truth = GroundTruth(reached=[Reached('u1', 9.0, (100.0, 0.0, 55.0))])
+    assert served(made, truth) == {'a': []}
+    made.apply({'kind': 'list', 'wall': 1.0, 'uav': 'u1', 'distance': 100.0, 'tasks': [
+        {'id': 'a', 'leg_distance': 100.0, 'via': [], 'position': [100.0, 0.0, 55.0]}]})
+    assert served(made, truth) == {'a': truth.reached}

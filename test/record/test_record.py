@@ -174,6 +174,46 @@ def test_an_item_counts_for_the_nearest_task_if_it_is_near():
     assert visits(run, {}) == {}
 
 
+def flies_into_a_zone(step):
+    """Entries of a UAV at 10 m/s into a zone that is sent at 10 Hz, moved by `step` [m]."""
+    moving = [ThreatZone.hemisphere('dome', (100.0 + step * k, 0.0, 0.0), 20.0)
+              for k in range(200)]
+    sent = [ZoneInterval(zone, 0.1 * k, 0.1 * (k + 1)) for k, zone in enumerate(moving)]
+    return zone_entries(flown(*((10.0 * k, 0.0, 5.0) for k in range(20))), sent)
+
+
+def test_a_zone_that_is_sent_often_is_entered_like_one_that_stays():
+    assert [len(flies_into_a_zone(step)) for step in (0.0, 0.01, -0.01)] == [1, 1, 1]
+
+
+def test_a_zone_that_moves_over_a_vehicle_is_not_entered():
+    moving = [ZoneInterval(ThreatZone.hemisphere('dome', (60.0 - 5.0 * k, 0.0, 0.0), 20.0),
+                           float(k), k + 1.0) for k in range(30)]
+    assert zone_entries(flown(*[(0.0, 0.0, 5.0)] * 30), moving) == []
+
+
+def items_at_one_place(*uavs):
+    truth = GroundTruth()
+    for wall, uav in enumerate(uavs):
+        truth.apply({'uav': uav, 'wall': float(wall), 'event': 'item_reached', 'x': 10.0,
+                     'y': 0.0, 'z': 5.0})
+    return truth
+
+
+def test_items_at_the_place_of_several_tasks_count_for_each_of_them():
+    places = dict.fromkeys('ab', (10.0, 0.0, 5.0))
+
+    def counts(*uavs, **more):
+        found = visits(items_at_one_place(*uavs), places, **more)
+        return [len(found[name]) for name in 'ab']
+    assert counts('u1') == [1, 0]
+    assert counts('u1', 'u1') == [1, 1]
+    assert counts('u1', 'u1', 'u1') == [2, 1]
+    assert counts('u1', 'u1', 'u1', waited={'a'}) == [1, 1]  # one of them waited there
+    assert counts('u1', owners={'b': 'u1'}) == [0, 1]
+    assert counts('u1', 'u1', owners={'a': 'u1', 'b': 'u2'}) == [2, 0]
+
+
 def test_a_lost_vehicle_has_no_further_track():
     run = flown((0, 0, 0), (30, 40, 0))
     run.apply({'t': 2.0, 'wall': 2.0, 'uav': 'u1', 'event': 'died'})

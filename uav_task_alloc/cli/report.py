@@ -108,7 +108,7 @@ def fate(name: str, state: RunState, reached: bool) -> str:
         return 'completed'
     if status is not None and status.state in _LEFT_OUT and status.reason:
         return 'unassigned'
-    if name in state.cancelled:
+    if name in state.cancelled and (status is None or status.state == 'CANCELLED'):
         return 'cancelled'
     return 'lost'
 

@@ -16,6 +16,7 @@ from uav_task_alloc.record.run_state import RunState, read_record
 
 TRUTH_FILE = 'flight.jsonl'
 _VISIT_RADIUS = 1.5  # [m] between a task and the mission item of its visit
+_SAME_PLACE = 0.1  # [m] between tasks that one item cannot tell apart
 _NEARNESS = ('separation_lost', 'separation_regained', 'least_distance')  # events
 _STEP = 1.0  # [m] between the points of a track that are tested against the zones
 
@@ -147,8 +148,8 @@ def read_run(out_dir: Path) -> tuple[RunState, GroundTruth]:
     return state, read_truth(out_dir, state.simulated)
 
 
-def visits(truth: GroundTruth, tasks: Mapping[str, Point],
-           waited: Container[str] = ()) -> dict[str, list[Reached]]:
+def visits(truth: GroundTruth, tasks: Mapping[str, Point], waited: Container[str] = (),
+           owners: Mapping[str, str] = {}) -> dict[str, list[Reached]]:
     """The mission items reached at each task.
 
     Args:
@@ -156,27 +157,38 @@ def visits(truth: GroundTruth, tasks: Mapping[str, Point],
         tasks: positions [m] by id.
         waited: ids of tasks where UAVs may have waited: items that a UAV reaches there one after
             the other are one visit.
+        owners: ids of the UAVs that completed tasks, by task id.
 
     Returns:
-        By task id; an item counts for the nearest task, if that is within 1.5 m.
+        By task id; an item counts for the nearest task, if that is within 1.5 m. Of several at
+        one place it counts for one that its UAV completed, where there is one, and for each of
+        them before it counts for one again.
     """
     visited: dict[str, list[Reached]] = {name: [] for name in tasks}
     last: dict[str, str | None] = {}  # task visited last, by UAV
     for reached in truth.reached:
-        nearest = min(tasks, key=lambda name: math.dist(tasks[name], reached.point), default=None)
-        if nearest is not None and math.dist(tasks[nearest], reached.point) <= _VISIT_RADIUS:
-            if nearest not in waited or last.get(reached.uav) != nearest:
-                visited[nearest].append(reached)
-            last[reached.uav] = nearest
-        else:
-            last[reached.uav] = None
+        near = _nearest(reached.point, tasks)
+        own = [name for name in near if owners.get(name) == reached.uav] or near
+        name = min(own, key=lambda task: len(visited[task]), default=None)
+        if name is not None and not (visited[name] and last.get(reached.uav) in own
+                                     and any(task in waited for task in own)):
+            visited[name].append(reached)
+        last[reached.uav] = name
     return visited
+
+
+def _nearest(point: Point, tasks: Mapping[str, Point]) -> list[str]:
+    """The task that is nearest to a point, with those at its place; none beyond 1.5 m."""
+    apart = {name: math.dist(place, point) for name, place in tasks.items()}
+    least = min(apart.values(), default=math.inf)
+    return [name for name, distance in apart.items()
+            if least <= _VISIT_RADIUS and distance <= least + _SAME_PLACE]
 
 
 def zone_entries(truth: GroundTruth, zones: Sequence[ZoneInterval]) -> list[ZoneEntry]:
     """Return every entry of a vehicle into a zone in force, without its margin.
 
-    A vehicle around which a zone appears does not enter it.
+    A vehicle around which a zone appears, or over which it moves, does not enter it.
 
     Args:
         truth: with all tracks.
@@ -185,21 +197,31 @@ def zone_entries(truth: GroundTruth, zones: Sequence[ZoneInterval]) -> list[Zone
     Returns:
         By UAV and zone, not by time.
     """
-    return [entry for uav, track in truth.tracks.items() for interval in zones
-            for entry in _entries(uav, track, interval)]
+    by_id: dict[str, list[ZoneInterval]] = {}
+    for interval in sorted(zones, key=lambda each: each.since):
+        by_id.setdefault(interval.zone.id, []).append(interval)
+    return [entry for uav, track in truth.tracks.items() for intervals in by_id.values()
+            for entry in _entries(uav, track, intervals)]
 
 
-def _entries(uav: str, track: Sequence[TrueSample], interval: ZoneInterval) -> Iterator[ZoneEntry]:
+def _entries(uav: str, track: Sequence[TrueSample],
+             intervals: Sequence[ZoneInterval]) -> Iterator[ZoneEntry]:
+    """Entries into one zone, which may have changed from interval to interval."""
     from uav_task_alloc.geometry.zones import distance  # imports numba
-    was_outside = False  # at the point before, while the zone was in force
+    at, before = 0, None  # index of the interval; the point before, while the zone was in force
     for wall, point in resampled(track):
-        if not interval.since <= wall < interval.until:
-            was_outside = False
+        while at < len(intervals) and wall >= intervals[at].until:
+            at += 1
+        if at == len(intervals):
+            return
+        zone = intervals[at].zone
+        if wall < intervals[at].since:
+            before = None
             continue
-        is_inside = distance(point, interval.zone) <= 0.0
-        if is_inside and was_outside:
-            yield ZoneEntry(uav, interval.zone.id, wall, point)
-        was_outside = not is_inside
+        if (before is not None and distance(point, zone) <= 0.0
+                and distance(before, zone) > 0.0):
+            yield ZoneEntry(uav, zone.id, wall, point)
+        before = point
 
 
 def resampled(track: Sequence[TrueSample]) -> Iterable[tuple[float, Point]]:

@@ -31,8 +31,11 @@ def served(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]]:
         By task id: of a point each visit; of work in pieces the end of the last pass, where
         vehicles flew along all its completed pieces, else none.
     """
-    points = {name: task.position for name, task in state.tasks.items() if not task.work}
-    found = visits(truth, points, state.waited)
+    points = {name: state.places.get(name, task.position)
+              for name, task in state.tasks.items() if not task.work}
+    owners = {name: status.uav for name, status in state.statuses.items()
+              if status.state == 'COMPLETED'}
+    found = visits(truth, points, state.waited, owners)
     passes = piece_passes(state, truth)
     for name in state.tasks.keys() - points.keys():
         of_work = [rows for piece, rows in passes.items() if split_piece(piece)[0] == name]

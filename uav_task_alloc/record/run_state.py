@@ -47,6 +47,7 @@ class RunState:
     cancelled: set[str] = field(default_factory=set)  # ids of tasks
     statuses: dict[str, ReportedStatus] = field(default_factory=dict)  # by task id
     pieces: dict[str, ReportedStatus] = field(default_factory=dict)  # by id of the piece
+    places: dict[str, Point] = field(default_factory=dict)  # [m] of listed tasks, by id
     ways: dict[str, list[Point]] = field(default_factory=dict)  # [m] of listed pieces, by id
     planned: dict[str, Service] = field(default_factory=dict)  # by task, of legs begun
     flown: dict[str, Service] = field(default_factory=dict)  # by task, of completed ones
@@ -111,6 +112,8 @@ class RunState:
             if line['action'] == 'CANCEL':
                 self.cancelled.add(task['id'])
             else:
+                if line['action'] == 'ADD':
+                    self.cancelled.discard(task['id'])
                 known = self.tasks.get(task['id'])
                 if known and line['action'] == 'ADD' and self._is_open(task['id']):
                     continue  # refused, or as it is already
@@ -187,6 +190,8 @@ class RunState:
                 self.planned[first['id']] = service
         rows = line['tasks']
         self.ways.update((row['id'], row['way']) for row in rows if 'way' in row)
+        self.places.update((row['id'], tuple(row['position'])) for row in rows
+                           if None not in row.get('position', (None,)))
         for before, row in zip((None, *rows), rows, strict=False):
             if row.get('wait', 0.0) > 0.0:
                 self.waited |= {row['id']} | ({before['id']} if before else set())
