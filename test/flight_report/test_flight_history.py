@@ -8,6 +8,7 @@ import pytest
 
 from uav_task_alloc.flight_report.figures import all_figures
 from uav_task_alloc.flight_report.flight_history import (
+    MAX_EVENTS,
     ReceptionGap,
     ReplanRecord,
     StateSpan,
@@ -36,7 +37,7 @@ def statuses(wall, **states):
 def state(wall, x, uav='u1'):
     return {'kind': 'state', 'wall': BEGIN + wall, 'uav': uav, 'mode': 'HOLD', 'active': '',
             'mission_state': 'VERIFIED', 'list_revision': 1, 'battery': None, 'available': True,
-            'position': [x, 0.0, 50.0], 'velocity': [0.0, 0.0, 0.0], 'range_remaining': None}
+            'position': [x, 0.0, 50.0], 'velocity': [None, None, None], 'range_remaining': None}
 
 
 def tasks_left(wall, *rows):
@@ -224,3 +225,62 @@ def test_the_report_has_the_services_as_planned_and_flown_and_their_windows():
     assert ('last task completed at [s]', 19.0) in key_figures(history)
     assert 'services' in report_page(history, 'x')
     assert 'services' not in {name for name, _, _ in all_figures(read_history(FLIGHT[:2]))}
+
+
+def moving(wall, x, speed, mode='ON_MISSION'):
+    return {**state(wall, x), 'mode': mode, 'velocity': [speed, 0.0, 0.0]}
+
+
+def test_the_metres_flown_are_those_in_flight_without_jumps_of_the_estimate():
+    standing = [moving(0.2 * k, 0.1 * (k % 2), 0.0, 'STANDBY') for k in range(1000)]
+    assert read_history(standing).metres('u1') == 0.0
+    jump = [moving(0.0, 0.0, 10.0), moving(1.0, 10.0, 10.0), moving(1.3, 80.0, 10.0),
+            moving(1.6, 14.0, 10.0), moving(2.6, 24.0, 10.0), moving(3.0, 27.0, 0.0, 'LANDING'),
+            moving(4.0, 28.0, 0.0, 'STANDBY'), moving(5.0, 29.0, 0.0, 'STANDBY')]
+    assert read_history(jump).metres('u1') == 24.0
+
+
+def test_what_a_uav_flew_while_its_states_were_not_received_counts():
+    assert read_history([moving(0.0, 0.0, 0.0), moving(40.0, 400.0, 0.0)]).metres('u1') == 400.0
+
+
+def row_of(text, name):
+    """Cells of a row of the report."""
+    cells = re.search(rf'<tr><td>{name}</td>(.*?)</tr>', text)[1]
+    return [cell for cell in re.sub('<.*?>', '|', cells).split('|') if cell]
+
+
+def test_a_task_ends_when_it_ended_last():
+    history = read_history([announced(0.0, a=[0, 0, 0]), statuses(1.0, a='REJECTED'),
+                            statuses(5.0, a='ACTIVE'), statuses(9.0, a='COMPLETED')])
+    assert row_of(report_page(history, 'x'), 'a') == [
+        'completed', 'u1', '2.0', '0.0', '5.0', '9.0']
+
+
+def test_a_task_that_the_allocator_has_forgotten_stays_as_it_ended():
+    history = read_history([announced(0.0, a=[0, 0, 0], b=[9, 0, 0]), state(0.0, 0.0),
+                            statuses(10.0, a='COMPLETED', b='ACTIVE'),
+                            statuses(20.0, b='COMPLETED')])
+    figures = dict(key_figures(history))
+    assert (figures['tasks completed'], figures.get('tasks pending')) == (2, None)
+    assert row_of(report_page(history, 'x'), 'u1')[0] == '2'
+
+
+def test_the_pieces_that_a_uav_flew_are_counted_for_it():
+    whole = {'task': 'f', 'state': 'COMPLETED', 'uav': '', 'reason': '', 'done': 2, 'pieces': 2}
+    line = statuses(10.0, **{'f#1': 'COMPLETED', 'f#2': 'COMPLETED'})
+    line['statuses'].append(whole)
+    history = read_history([announced(0.0, f=[0, 0, 0]), state(0.0, 0.0), line])
+    assert row_of(report_page(history, 'x'), 'u1')[0] == '2'
+    assert 'f completed' in [text for _, _, text in history.events]
+
+
+def test_of_many_events_the_newest_and_the_faults_are_kept():
+    modes = [{**state(float(k), 0.0), 'mode': ('HOLD', 'ON_MISSION')[k % 2]}
+             for k in range(4 * MAX_EVENTS)]
+    modes[50]['mode'] = 'FAULT'
+    history = read_history(modes)
+    assert history.events[0] == (1050.0, 'fault', 'u1: fault')
+    assert (history.events[-1][0], len(history.events)) == (modes[-1]['wall'], MAX_EVENTS + 1)
+    assert f'{history.dropped} earlier events are left out.' in report_page(history, 'x')
+    assert history.dropped == 4 * MAX_EVENTS - len(history.events)

@@ -22,7 +22,7 @@ def completed(wall, name):
 def at(wall, x):
     return {'kind': 'state', 'wall': BEGIN + wall, 'uav': 'u1', 'mode': 'HOLD', 'active': '',
             'mission_state': 'VERIFIED', 'list_revision': 1, 'battery': None, 'available': True,
-            'position': [x, 0.0, 50.0], 'velocity': [0.0, 0.0, 0.0], 'range_remaining': None}
+            'position': [x, 0.0, 50.0], 'velocity': [None, None, None], 'range_remaining': None}
 
 
 def sent(wall, *waits, tasks=()):
@@ -67,3 +67,20 @@ def test_without_waiting_places_there_is_no_section():
     text = report_page(history, 'x.mcap')
     assert '<summary>Waiting</summary>' not in text
     assert 'id="demand"' not in text
+
+
+def test_tasks_that_ended_before_the_recording_do_not_count():
+    old = [{'task': f'o{k}', 'state': 'COMPLETED', 'uav': 'u1', 'reason': ''} for k in range(9)]
+    flight = [{**completed(0.0, 'n'), 'statuses': old}, announced(0.1, 'o0', 0.0, 0.0),
+              announced(0.1, 'n', 0.0, 0.0),
+              {**completed(84.1, 'n'), 'statuses': [*old, *completed(0.0, 'n')['statuses']]}]
+    history = read_history(flight)
+    assert mean_response(history) == pytest.approx(80.0)
+    assert list(history.run.flown) == list(history.spans) == ['n']
+
+
+def test_a_task_was_announced_when_its_stamp_says_where_that_is_before_the_recording():
+    flight = [{**announced(0.0, 'a', 0.0, 0.0), 'stamp': BEGIN - 50.0}, completed(14.0, 'a')]
+    assert mean_response(read_history(flight)) == pytest.approx(60.0)
+    late = {**announced(9.0, 'b', 0.0, 0.0), 'stamp': BEGIN - 50.0}  # of another clock
+    assert read_history([*flight, late]).run.tasks['b'].wall == BEGIN + 9.0

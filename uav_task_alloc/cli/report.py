@@ -49,6 +49,7 @@ def summarise(out_dir: str | Path) -> Summary:
 def run_summary(state: RunState, truth: GroundTruth) -> Summary:
     """The key figures of a run; a task counts as completed only if a vehicle was there."""
     reached, passes = served(state, truth), piece_passes(state, truth)
+    known = {**state.ended, **state.statuses}
     fates = {name: fate(name, state, bool(reached[name])) for name in state.tasks}
     names = {kind: sorted(name for name, its_fate in fates.items() if its_fate == kind)
              for kind in ('completed', 'unassigned', 'cancelled', 'lost')}
@@ -77,7 +78,7 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
         'uavs_lost': len(truth.died),
         'wall_s': round(max(0.0, state.last - state.first) / state.stretch, 1)
         if state.solves else 0.0,
-        'unassigned': {name: state.statuses[name].reason for name in names['unassigned']},
+        'unassigned': {name: known[name].reason for name in names['unassigned']},
         'lost': {name: why_lost(name, state) for name in names['lost']},
         'flown_twice': twice,
         'entries': [f'{entry.uav} into {entry.zone} at '
@@ -103,7 +104,7 @@ def finish(state: RunState, reached: Mapping[str, Sequence[Reached]],
 
 def fate(name: str, state: RunState, reached: bool) -> str:
     """`completed`, `unassigned`, `cancelled` or `lost`; `reached`: a vehicle was at the task."""
-    status = state.statuses.get(name)
+    status = state.status(name)
     if status is not None and status.state == 'COMPLETED' and reached:
         return 'completed'
     if status is not None and status.state in _LEFT_OUT and status.reason:
@@ -115,7 +116,7 @@ def fate(name: str, state: RunState, reached: bool) -> str:
 
 def why_lost(name: str, state: RunState) -> str:
     """The last status of a lost task."""
-    status = state.statuses.get(name)
+    status = state.status(name)
     if status is None:
         return 'no status'
     if status.state == 'COMPLETED':
@@ -125,7 +126,8 @@ def why_lost(name: str, state: RunState) -> str:
 
 def planned_length(state: RunState, completed: Sequence[str]) -> float:
     """Length [m] of the legs to completed tasks and home, as planned when each became next."""
-    rows = {**{name: state.statuses[name] for name in completed}, **{
+    known = {**state.ended, **state.statuses}
+    rows = {**{name: known[name] for name in completed}, **{
         piece: row for piece, row in state.pieces.items() if row.state == 'COMPLETED'}}
     legs = [state.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
     home = [line['distance'] or 0.0 for line in state.lists.values() if not line['tasks']]

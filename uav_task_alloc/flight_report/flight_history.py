@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 from uav_task_alloc.geometry.polyline import polyline_length
@@ -22,7 +23,11 @@ from uav_task_alloc.record.reported import END_STATES, ReportedStatus
 from uav_task_alloc.record.run_state import RunState
 
 _SAMPLE_PERIOD = 0.2  # [s] between the samples of a track, of height and battery
-MAX_EVENTS = 5000  # later ones are dropped
+MAX_EVENTS = 5000  # the newest are kept, and of the faults before them as many
+_ON_GROUND = frozenset({'', 'UNKNOWN', 'STANDBY'})  # modes
+# a step of a track is flown where speed [m/s], acceleration [m/s2], delay [s] and error [m] of its
+# ends explain it; others are jumps of the estimate
+_ACCELERATION, _DELAY, _ERROR = 3.0, 1.0, 2.0
 _OPEN_STATES = ('PENDING', 'ASSIGNED', 'ACTIVE')
 
 
@@ -73,6 +78,7 @@ class FlightHistory:
 
     run: RunState = field(default_factory=RunState)
     tracks: dict[str, list[TrueSample]] = field(default_factory=dict)
+    flown: dict[str, list[bool]] = field(default_factory=dict)  # steps of tracks, by UAV
     levels: dict[str, list[LevelSample]] = field(default_factory=dict)  # by UAV
     homes: dict[str, float] = field(default_factory=dict)  # [m] above the origin, by UAV
     last_state: dict[str, float] = field(default_factory=dict)  # [unix s] of each UAV
@@ -87,6 +93,7 @@ class FlightHistory:
     replans: list[ReplanRecord] = field(default_factory=list)
     gaps: list[ReceptionGap] = field(default_factory=list)
     events: list[tuple[float, str, str]] = field(default_factory=list)  # [unix s], kind, text
+    dropped: int = 0  # events
     last_plan: Line | None = None  # not compared yet
     routes: dict[str, list[str]] = field(default_factory=dict)  # of the plan before it
 
@@ -97,12 +104,20 @@ class FlightHistory:
             return
         if 0.0 < self.run.last < line['wall'] - self.run.silent_after:
             self.gaps.append(ReceptionGap('', self.run.last, line['wall']))
-        if len(self.events) < MAX_EVENTS:
-            self.events += [(line['wall'], *event) for event in sentences(self.run, line)]
+        self.events += [(line['wall'], *event) for event in sentences(self.run, line)]
+        if len(self.events) > 3 * MAX_EVENTS:
+            self.drop_events()
         handler = getattr(self, 'on_' + line['kind'], None)
         if handler is not None:
             handler(line)
         self.run.apply(line)
+
+    def drop_events(self) -> None:
+        """Keep the newest events, and the newest faults before them."""
+        before, newest = self.events[:-MAX_EVENTS], self.events[-MAX_EVENTS:]
+        faults = [event for event in before if event[1] == 'fault'][-MAX_EVENTS:]
+        self.dropped += len(before) - len(faults)
+        self.events = [*faults, *newest]
 
     def on_announcement(self, line: Line) -> None:
         """Record the values of tasks, and the widths of strips."""
@@ -112,8 +127,13 @@ class FlightHistory:
                                  if task.get('strip_width'))
 
     def on_statuses(self, line: Line) -> None:
-        """Begin a span where the state of a task or its UAV changes."""
+        """Begin a span where the state of a task or its UAV changes.
+
+        When tasks ended that had before the recording is not known.
+        """
         for row in line['statuses']:
+            if row['task'] not in self.spans and self.run.ended_before(row, line):
+                continue
             spans = self.spans.setdefault(row['task'], [])
             if not spans or (spans[-1].state, spans[-1].uav) != (row['state'], row['uav']):
                 spans.append(StateSpan(line['wall'], row['state'], row['uav']))
@@ -133,6 +153,20 @@ class FlightHistory:
         track = self.tracks.setdefault(uav, [])
         if None not in line['position'] and (not track or wall - track[-1].wall >= _SAMPLE_PERIOD):
             track.append(TrueSample(wall, tuple(line['position'])))
+            if len(track) > 1:
+                self.flown.setdefault(uav, []).append(self._is_flown(track[-2], track[-1], line))
+
+    def _is_flown(self, before: TrueSample, after: TrueSample, line: Line) -> bool:
+        """Whether a UAV flew from one sample to the next, whose state is `line`."""
+        old = self.run.uavs[line['uav']]
+        if old['mode'] in _ON_GROUND and line['mode'] in _ON_GROUND:
+            return False
+        if None in (*old['velocity'], *line['velocity']):
+            return True
+        speed = max(math.hypot(*state['velocity']) for state in (old, line))
+        time = (after.wall - before.wall) * self.run.speedup
+        return math.dist(before.point, after.point) <= (
+            speed * (time + _DELAY) + 0.5 * _ACCELERATION * time * time + _ERROR)
 
     def on_list(self, line: Line) -> None:
         """Record the leg to a task that has become the next, from the position of the UAV."""
@@ -171,6 +205,7 @@ class FlightHistory:
     def close(self) -> None:
         """End the flight: compare the last plan, close the gaps."""
         self.compare()
+        self.drop_events()
         end = self.run.last
         self.gaps += [ReceptionGap(uav, wall, end) for uav, wall in sorted(self.last_state.items())
                       if end - wall > self.run.silent_after]
@@ -198,7 +233,7 @@ class FlightHistory:
 
     def status(self, task: str) -> ReportedStatus:
         """The last status of a task."""
-        return self.run.statuses.get(task) or ReportedStatus('PENDING', '', 'no status received')
+        return self.run.status(task) or ReportedStatus('PENDING', '', 'no status received')
 
     def lost(self) -> dict[str, TrueSample]:
         """The last position of each UAV that fell silent in flight and stayed silent.
@@ -225,9 +260,14 @@ class FlightHistory:
         return max((span.since for span in ends if span.state in END_STATES),
                    default=self.run.last)
 
+    def steps(self, uav: str) -> Iterator[tuple[TrueSample, TrueSample]]:
+        """Steps of a track that were flown: neither on the ground nor jumps of the estimate."""
+        steps = zip(pairwise(self.tracks.get(uav, ())), self.flown.get(uav, ()), strict=True)
+        return (step for step, is_flown in steps if is_flown)
+
     def metres(self, uav: str) -> float:
-        """Length of a track [m]."""
-        return polyline_length([sample.point for sample in self.tracks[uav]])
+        """Length of a track in flight [m]."""
+        return math.fsum(math.dist(a.point, b.point) for a, b in self.steps(uav))
 
     def metres_planned(self, uav: str) -> float:
         """Length [m] of the legs that were begun, as planned at their begin."""

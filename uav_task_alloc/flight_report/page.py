@@ -19,6 +19,7 @@ from uav_task_alloc.flight_report.strips import covered_shares, piece_rows
 from uav_task_alloc.flight_report.waiting import waiting_figures, waiting_rows
 from uav_task_alloc.geometry.frames import to_geodetic
 from uav_task_alloc.record.bag_reader import BagReader
+from uav_task_alloc.record.reported import END_STATES
 
 # names of tasks and UAVs come from the network: no other script may run, nothing is loaded
 POLICY = ("default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -182,8 +183,8 @@ def tables(history: FlightHistory) -> str:
                    (_task_row(history, task) for task in history.tasks())),
         _strips_table(history),
         _waiting_table(history),
-        html_table('UAVs', ('UAV', 'tasks completed', 'metres flown', 'metres planned', 'battery',
-                            'last mode', 'done at [s]', 'silent [s]', 'lost at [s]',
+        html_table('UAVs', ('UAV', 'tasks and pieces completed', 'metres flown', 'metres planned',
+                            'battery', 'last mode', 'done at [s]', 'silent [s]', 'lost at [s]',
                             'last position'),
                    (_uav_row(history, uav) for uav in sorted(history.tracks))),
         html_table('Re-plans', ('at [s]', 'plan', 'trigger', 'changes', 'solve time [ms]', 'fit',
@@ -197,7 +198,8 @@ def tables(history: FlightHistory) -> str:
                      round((gap.until - gap.since) * history.run.speedup, 1))
                     for gap in history.gaps)),
         html_table('Events', ('at [s]', 'event'),
-                   ((at(wall), text) for wall, _, text in history.events))))
+                   ((at(wall), text) for wall, _, text in history.events)),
+        f'<p>{history.dropped} earlier events are left out.</p>' if history.dropped else ''))
 
 
 def _strips_table(history: FlightHistory) -> str:
@@ -237,19 +239,21 @@ def _task_row(history: FlightHistory, task: str) -> tuple[Cell, ...]:
     known = history.run.tasks.get(task)
     spans = history.spans.get(task, [])
 
-    def first(*states: str) -> Cell:
-        span: StateSpan | None = next((span for span in spans if span.state in states), None)
+    def since(found: Iterable[StateSpan]) -> Cell:
+        span = next(iter(found), None)
         return None if span is None else round(history.clock(span.since), 1)
 
     return (task, status.state.lower(), status.uav, history.values.get(task),
-            round(history.clock(known.wall), 1) if known else None, first('ACTIVE'),
-            first('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED'), status.reason)
+            round(history.clock(known.wall), 1) if known else None,
+            since(span for span in spans if span.state == 'ACTIVE'),
+            since(span for span in spans[-1:] if span.state in END_STATES), status.reason)
 
 
 def _uav_row(history: FlightHistory, uav: str) -> tuple[Cell, ...]:
     state = history.run.uavs[uav]
-    done = sum(status.uav == uav and status.state == 'COMPLETED'
-               for status in history.run.statuses.values())
+    ended = (*map(history.status, history.tasks()), *history.run.pieces.values())
+    done = sum(status.uav == uav and status.state == 'COMPLETED' and not status.pieces
+               for status in ended)
     silent = sum(gap.until - gap.since for gap in history.gaps if gap.uav == uav)
     battery, lost = state['battery'], history.lost().get(uav)
     return (uav, done, round(history.metres(uav)), round(history.metres_planned(uav)),

@@ -40,12 +40,11 @@ def waiting_rows(history: FlightHistory) -> list[WaitingRow]:
 
 
 def _metres(history: FlightHistory, uav: str) -> float:
-    """Length [m] of the track of a UAV between samples at which it had a place."""
-    changes, track = history.waits[uav], history.tracks.get(uav, ())
+    """Length [m] of the track of a UAV in flight between samples at which it had a place."""
+    changes = history.waits[uav]
     since, waits = [wall for wall, _ in changes], [False, *(p is not None for _, p in changes)]
-    had = [waits[bisect_right(since, sample.wall)] for sample in track]
-    return math.fsum(math.dist(one.point, two.point) for (one, a), (two, b) in pairwise(
-        zip(track, had, strict=True)) if a and b)
+    return math.fsum(math.dist(a.point, b.point) for a, b in history.steps(uav)
+                     if all(waits[bisect_right(since, sample.wall)] for sample in (a, b)))
 
 
 def mean_response(history: FlightHistory) -> float | None:

@@ -51,6 +51,8 @@ def status_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
             groups.setdefault((row['state'], row['uav'], row['reason']), []).append(row['task'])
     for (name, uav, reason), tasks in groups.items():
         kind, text = STATE_SENTENCES[name]
+        if name == 'COMPLETED' and not uav:  # work of which several flew pieces
+            text = '{tasks} completed'
         yield kind, text.format(tasks=_ids(tasks), uav=uav or 'no UAV',
                                 reason=reason or 'no reason given')
 

@@ -54,7 +54,8 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
         origin: of the ENU frame; None: tasks in WGS84 are left out.
 
     Returns:
-        Kind `announcement`; positions in ENU [m], a cancelled task has its id only.
+        Kind `announcement`; positions in ENU [m], a cancelled task has its id only; `stamp`
+        [unix s] where it has one.
     """
     tasks = []
     for task in msg.tasks:
@@ -73,7 +74,9 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
                  **({'vertical': 'TERRAIN'} if above_ground(task) else {})}
             )
     action = constant_name(EVENT_ACTIONS, msg.action)
-    return {'kind': 'announcement', 'action': action, 'tasks': tasks}
+    stamp = from_stamp(msg.header.stamp)
+    return {'kind': 'announcement', 'action': action, 'tasks': tasks,
+            **({'stamp': stamp} if stamp else {})}
 
 
 def _window(task: _Message) -> RecordBody:

@@ -15,6 +15,7 @@ from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lists
 from uav_task_alloc.record.record_file import RECORD_FILE, Line, read_lines
 from uav_task_alloc.record.reported import (
+    END_STATES,
     AnnouncedTask,
     ReportedAuthority,
     ReportedStatus,
@@ -46,6 +47,7 @@ class RunState:
     tasks: dict[str, AnnouncedTask] = field(default_factory=dict)  # announced, by id
     cancelled: set[str] = field(default_factory=set)  # ids of tasks
     statuses: dict[str, ReportedStatus] = field(default_factory=dict)  # by task id
+    ended: dict[str, ReportedStatus] = field(default_factory=dict)  # forgotten tasks, by id
     pieces: dict[str, ReportedStatus] = field(default_factory=dict)  # by id of the piece
     places: dict[str, Point] = field(default_factory=dict)  # [m] of listed tasks, by id
     ways: dict[str, list[Point]] = field(default_factory=dict)  # [m] of listed pieces, by id
@@ -118,11 +120,46 @@ class RunState:
                 if known and line['action'] == 'ADD' and self._is_open(task['id']):
                     continue  # refused, or as it is already
                 self.tasks[task['id']] = AnnouncedTask(
-                    tuple(task['position']), known.wall if known else line['wall'],
+                    tuple(task['position']), known.wall if known else self._announced_at(line),
                     task.get('service', 0.0), task.get('earliest'), task.get('latest'),
                     task.get('work', ''), tuple(map(tuple, task.get('path', ()))),
                     tuple(tuple(map(tuple, hole)) for hole in task.get('holes', ())),
                     task.get('radius') or 0.0)
+
+    def _announced_at(self, line: Line) -> float:
+        """When tasks were announced [unix s]: by the stamp, where that is before the record."""
+        wall, stamp = line['wall'], line.get('stamp', line['wall'])
+        is_earlier = self.silent_after < wall - stamp < _MAX_STAMP_AGE
+        return float(stamp if is_earlier and self._in_opening(line) else wall)
+
+    def _in_opening(self, line: Line) -> bool:
+        """Whether a line may be of a latched message from before the record."""
+        return bool(line['wall'] - self.first <= self.silent_after)
+
+    def ended_before(self, row: Line, line: Line) -> bool:
+        """Return whether a task of which no end is known had ended before the record began.
+
+        Args:
+            row: its status.
+            line: with all statuses, not yet applied.
+
+        Returns:
+            Whether it has ended in the first statuses of the record, and since then.
+        """
+        old = self.statuses.get(row['task']) or self.pieces.get(row['task'])
+        return row['state'] in END_STATES and (
+            old.state == row['state'] if old else not self.statuses and self._in_opening(line))
+
+    def status(self, task: str) -> ReportedStatus | None:
+        """Return the last status of a task.
+
+        Args:
+            task: id.
+
+        Returns:
+            Also of one that the allocator has forgotten since; None: there was none.
+        """
+        return self.statuses.get(task) or self.ended.get(task)
 
     def _is_open(self, task_id: str) -> bool:
         """Whether the allocator has the task, so that only an UPDATE changes it."""
@@ -132,13 +169,16 @@ class RunState:
     def on_statuses(self, line: Line) -> None:
         """The statuses of all tasks."""
         for row in line['statuses']:
-            if row['state'] == 'COMPLETED' and row['task'] not in self.flown:
+            if (row['state'] == 'COMPLETED' and row['task'] not in self.flown
+                    and not self.ended_before(row, line)):
                 task = self.tasks.get(row['task'])
                 service = task.service / self.speedup if task else 0.0
                 self.flown[row['task']] = Service(row['uav'], line['wall'] - service, line['wall'])
         rows = {row['task']: ReportedStatus(row['state'], row['uav'], row['reason'],
                                             row.get('done', 0), row.get('pieces', 0))
                 for row in line['statuses']}
+        self.ended.update((task, row) for task, row in self.statuses.items()
+                          if task not in rows and row.state in END_STATES)
         self.pieces = {task: row for task, row in rows.items() if split_piece(task)[1]}
         self.statuses = {task: row for task, row in rows.items() if task not in self.pieces}
 
