@@ -165,6 +165,8 @@ def test_the_report_command_refuses_to_draw_a_demo_as_a_page(run, tmp_path):
     (tmp_path / 'summary.json').write_text(json.dumps({**run(ALL_DONE), 'wall_s': 77.0}))
     with pytest.raises(InvalidValue, match=r'--html = .*expected a recording, FILE.mcap'):
         report.main([str(tmp_path), '--html', str(tmp_path / 'page.html')])
+    with pytest.raises(InvalidValue, match=r"--namespace = 'north': expected a recording"):
+        report.main([str(tmp_path), '--namespace', 'north'])
     assert not (tmp_path / 'page.html').exists()
 
 

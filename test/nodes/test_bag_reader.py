@@ -93,6 +93,42 @@ def test_the_origin_that_the_fleet_published_is_that_of_the_bag(tmp_path):
     assert len(lines[2]['tasks']) == 1
 
 
+def test_a_task_in_degrees_that_was_announced_before_the_origin_has_its_place(tmp_path):
+    origin = m.FleetOrigin(latitude=47.0, longitude=8.0, altitude_amsl=400.0)
+    _, first, second, _ = BagReader(write(tmp_path / 'w.mcap', [
+        ('/task_announcements', WGS), ('/task_announcements', WGS), ('/fleet_origin', origin)]))
+    for line in (first, second):
+        assert line['tasks'][0]['position'] == pytest.approx((0.0, 1111.8, 19.9), abs=0.3)
+
+
+def test_the_report_says_how_many_tasks_have_no_place(tmp_path, capsys):
+    path = write(tmp_path / 'w.mcap', [('/task_announcements', WGS), *MESSAGES[4:]])
+    assert report.main([str(path)]) == 0
+    assert 'Warning: 1 tasks in degrees are left out: there is no fleet_origin' in (
+        capsys.readouterr().err)
+
+
+TWO_FLEETS = [
+    *((f'/{name}/uav_states', state(k)) for k in range(3) for name in ('north', 'south')),
+    *((f'/{name}/u1/task_list', m.TaskList(uav_id='u1', revision=revision))
+      for revision, name in enumerate(('north', 'south'), 1)),
+    ('/threat_zones', from_zones(ZONES, 0.0))]
+
+
+def test_of_several_fleets_in_a_bag_one_is_chosen(tmp_path, capsys):
+    path = write(tmp_path / 'two.mcap', TWO_FLEETS)
+    with pytest.raises(InvalidValue, match=r'expected one fleet, found uav_states of /north and of'
+                                           r' /south; choose one with --namespace'):
+        report.main([str(path)])
+    for namespace, revision in (('/north', 1), ('south', 2)):
+        _, *states, tasks = BagReader(path, namespace)
+        assert ([line['kind'] for line in states], tasks['revision']) == (['state'] * 3, revision)
+        assert report.main([str(path), '--namespace', namespace]) == 0
+    assert [line['kind'] for line in BagReader(path, '/')] == ['run', 'zones']
+    with pytest.raises(InvalidValue, match='none of /west'):
+        report.main([str(path), '--namespace', 'west'])
+
+
 def test_the_report_prints_its_path_and_its_figures(whole, tmp_path, capsys):
     html = tmp_path / 'flight.html'
     assert report.main([str(whole), '--html', str(html)]) == 0

@@ -188,11 +188,11 @@ def _with_reasons(reasons: Mapping[str, str]) -> str:
     return '; '.join(f'{name}: {reason}' for name, reason in reasons.items())
 
 
-def flight_page(bag: Path, html: Path, flown: Path | None) -> int:
+def flight_page(bag: Path, html: Path, flown: Path | None, namespace: str | None) -> int:
     """Write the report of an MCAP file, and its map, and print its key figures.
 
     Raises:
-        AllocError: the file has no messages of a fleet, the page cannot be written, or a package
+        AllocError: the file has no messages of one fleet, the page cannot be written, or a package
             is not installed.
         SystemExit: the file cannot be read.
     """
@@ -203,7 +203,7 @@ def flight_page(bag: Path, html: Path, flown: Path | None) -> int:
     check_file('--map', flown, MAP_SUFFIXES, [bag, html])
     from uav_task_alloc.flight_report import page  # imports plotly and mcap
     with naming('--html', html):
-        history, warnings = page.write_report(bag, html)
+        history, warnings = page.write_report(bag, html, namespace)
     for name, value in page.key_figures(history):
         print(f'{name:<45}{"" if value is None else value!s:>12}')
     for text in warnings:
@@ -285,12 +285,15 @@ def main(argv: Sequence[str]) -> int:
                         'a recording (default: FILE.html beside FILE.mcap)')
     parser.add_argument('--map', type=Path, metavar='OUT.geojson', help='write tracks, tasks and '
                         'zones for maps (.geojson, .kml) (default: none)')
+    parser.add_argument('--namespace', metavar='NAME', help='of the fleet, where a recording has '
+                        'several (default: the only one)')
     args = parser.parsed(argv)
     place = args.place
     if place.is_dir() or place.suffix == '.json':
-        if args.html:
-            raise InvalidValue('--html', str(args.html), 'a recording, FILE.mcap, to draw: '
-                               f'{place} is of a demo, whose table is printed')
+        for option, value in (('--html', args.html), ('--namespace', args.namespace)):
+            if value is not None:
+                raise InvalidValue(option, str(value), 'a recording, FILE.mcap, to draw: '
+                                   f'{place} is of a demo, whose table is printed')
         return demo_table(place, args.map)
     return flight_page(place, args.html or Path(f'{str(place).removesuffix(".mcap")}.html'),
-                       args.map)
+                       args.map, args.namespace)

@@ -53,29 +53,34 @@ CONFIG = {'displaylogo': False, 'responsive': True,
 Cell = str | float | int | None
 
 
-def write_report(bag: Path, html: Path) -> tuple[FlightHistory, list[str]]:
+def write_report(bag: Path, html: Path,
+                 namespace: str | None = None) -> tuple[FlightHistory, list[str]]:
     """Write the report of an MCAP file.
 
     Args:
         bag: the MCAP file.
         html: the report.
+        namespace: of the fleet; None: the only one in the file.
 
     Returns:
         The flight, and warnings on damage and undecodable messages.
 
     Raises:
         OSError: a file cannot be read or written.
-        InvalidValue: the MCAP file has no messages of a fleet.
+        InvalidValue: the MCAP file has no messages of a fleet, or those of several.
     """
-    reader = BagReader(bag)
+    reader = BagReader(bag, namespace)
     history = read_history(reader)
     warnings = [f'{bag.name}: {reader.damage}; the report covers what is before'] * bool(
         reader.damage)
     warnings += [f'{count} messages of {topic} could not be decoded'
                 for topic, count in reader.undecodable.items()]
+    warnings += [f'{len(reader.unplaced)} tasks in degrees are left out: there is no fleet_origin'
+                 ] * bool(reader.unplaced)
     if not history.tasks() and not history.tracks:
         raise InvalidValue('file', str(bag), 'messages of a fleet in it, found '
                            f'{reader.counted.total()} of {len(reader.counted)} topics'
+                           + f', none of {reader.namespace}' * bool(reader.namespace)
                            + f' ({reader.damage})' * bool(reader.damage))
     html.write_text(report_page(history, bag.name, warnings), encoding='utf-8')
     return history, warnings

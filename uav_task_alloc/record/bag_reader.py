@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -22,28 +22,34 @@ from uav_task_alloc.record.bag import METADATA_NAME
 from uav_task_alloc.record.record_file import Line
 
 _PACKAGE = 'uav_task_alloc_msgs/msg/'
+_ORIGIN, _LIST = _PACKAGE + 'FleetOrigin', _PACKAGE + 'TaskList'
+_ANNOUNCEMENT = _PACKAGE + 'TaskAnnouncement'
+_DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 _MAX_RECORD_SIZE = 2**30  # [bytes]; a larger size is damage
-# by type, so that the namespace of the topics does not matter
+# by type, so that the names of the topics do not matter
 _BUILDERS: dict[str, Callable[[Any], message_records.RecordBody]] = {
     _PACKAGE + 'ThreatZoneArray': message_records.zones_record,
     _PACKAGE + 'TaskStatusArray': message_records.statuses_record,
     _PACKAGE + 'Allocation': message_records.allocation_record,
-    _PACKAGE + 'TaskList': message_records.task_list_record,
+    _LIST: message_records.task_list_record,
     _PACKAGE + 'UavState': message_records.state_record,
     _PACKAGE + 'SeparationAlert': message_records.separation_record,
-    _PACKAGE + 'FleetOrigin': message_records.origin_record,
-    'diagnostic_msgs/msg/DiagnosticArray': diagnostic_records.uploads_record}
-_ANNOUNCEMENT = _PACKAGE + 'TaskAnnouncement'
+    _ORIGIN: message_records.origin_record,
+    _DIAGNOSTICS: diagnostic_records.uploads_record}
+_TYPES = frozenset({*_BUILDERS, _ANNOUNCEMENT})
 
 
 class BagReader:
-    """The lines of an MCAP file; iterate once.
+    """The lines of one fleet in an MCAP file; iterate once.
 
-    Afterwards `damage` is a text on the damage that ended the iteration, or '', and `undecodable`
-    has the number of undecodable messages by topic.
+    Afterwards `damage` is a text on the damage that ended the iteration, or '', `undecodable`
+    has the number of undecodable messages by topic, and `unplaced` the ids of tasks in degrees
+    that are left out, as there is no origin.
 
     Args:
         path: of the MCAP file.
+        namespace: of the fleet; None: the only one.
+        types: of the messages that are read.
 
     Arguments of methods:
         file: open, binary.
@@ -51,15 +57,20 @@ class BagReader:
 
     Raises:
         OSError: while iterating; the file cannot be read.
-        InvalidValue: while iterating; it is no MCAP file.
+        InvalidValue: while iterating; it is no MCAP file, or has several fleets.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, namespace: str | None = None,
+                 types: Container[str] = _TYPES) -> None:
+        self.path, self.types = path, types
+        self.namespace = None if namespace is None else f'/{namespace.strip("/")}'
+        self.namespaces: dict[str, str] = {}  # by the last part of topics
         self.damage = ''
         self.undecodable: Counter[str] = Counter()  # messages by topic
         self.counted: Counter[str] = Counter()  # messages by topic
+        self.unplaced: set[str] = set()
         self.origin: Origin | None = None
+        self.origin_sought = False
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.decoders = DecoderFactory()
@@ -68,6 +79,8 @@ class BagReader:
         with self.path.open('rb') as file:
             try:
                 yield from self.records(file)
+            except InvalidValue:
+                raise
             except InvalidMagic:
                 if file.tell() <= 8:
                     raise InvalidValue('file', str(self.path), 'an MCAP file') from None
@@ -110,17 +123,15 @@ class BagReader:
         channel = self.channels[message.channel_id]
         schema = self.schemas.get(channel.schema_id)
         self.counted[channel.topic] += 1
-        if schema is None or (schema.name not in _BUILDERS and schema.name != _ANNOUNCEMENT):
+        if (schema is None or schema.name not in self.types
+                or not self.is_of_fleet(channel.topic, schema.name)):
             return
         try:
             decode = self.decoders.decoder_for(channel.message_encoding, schema)
             if decode is None:
                 raise ValueError(f'{channel.message_encoding}: expected cdr')
-            body = (
-                message_records.announcement_record(decode(message.data), self.origin)
-                if schema.name == _ANNOUNCEMENT
-                else _BUILDERS[schema.name](decode(message.data))
-            )
+            body = (self.announcement if schema.name == _ANNOUNCEMENT
+                    else _BUILDERS[schema.name])(decode(message.data))
         except Exception:  # the decoder raises anything for bytes of another type
             self.undecodable[channel.topic] += 1
             return
@@ -128,3 +139,41 @@ class BagReader:
             self.origin = Origin(*(body[name] for name in (
                 'latitude', 'longitude', 'altitude_amsl')))
         yield {'wall': message.log_time * 1e-9, **body}
+
+    def announcement(self, msg: Any) -> message_records.RecordBody:
+        """The record of a TaskAnnouncement, by the first origin of the file where none is known.
+
+        Args:
+            msg: TaskAnnouncement.
+        """
+        in_degrees = {task.task_id for task in msg.tasks if task.frame == message_records.WGS84}
+        if in_degrees and self.origin is None and not self.origin_sought:
+            self.origin_sought = True
+            ahead = BagReader(self.path, self.namespace, {_ORIGIN})
+            next((line for line in ahead if line['kind'] == 'origin'), None)
+            self.origin = ahead.origin
+        if self.origin is None:
+            self.unplaced |= in_degrees
+        return message_records.announcement_record(msg, self.origin)
+
+    def is_of_fleet(self, topic: str, type_name: str) -> bool:
+        """Whether a topic is of the fleet that is read.
+
+        Args:
+            topic: its full name.
+            type_name: of its messages.
+
+        Raises:
+            InvalidValue: it is of another fleet than those before, and none was chosen.
+        """
+        if type_name == _DIAGNOSTICS:
+            return True
+        *above, name = topic.split('/')
+        namespace = '/'.join(above[:-1] if type_name == _LIST else above) or '/'  # <uav_id>/
+        if self.namespace is not None:
+            return namespace == self.namespace
+        other = self.namespaces.setdefault(name, namespace)
+        if other != namespace:
+            raise InvalidValue('file', str(self.path), f'one fleet, found {name} of {other} and '
+                               f'of {namespace}; choose one with --namespace')
+        return True

@@ -29,7 +29,7 @@ MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
 FENCES = (*MISSIONS, 'OFF', 'UNSUPPORTED', 'REFUSED')
 AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
 SEPARATION_ACTIONS = ('NONE', 'HOLD', 'RELEASE', 'UNRESOLVED')
-_FRAME_LOCAL, _FRAME_WGS84 = 0, 1  # of a Task message
+_FRAME_LOCAL, WGS84 = 0, 1  # of a Task message
 _TERRAIN = 1  # `vertical` of a Task message
 
 
@@ -102,7 +102,7 @@ def task_position(task: _Message, origin: Origin | None) -> Point | None:
     place = f'task {task.task_id}: '
     if task.frame == _FRAME_LOCAL:
         return check_point(place + 'position', _xyz(task.position))
-    if task.frame != _FRAME_WGS84:
+    if task.frame != WGS84:
         raise InvalidValue(place + 'frame', task.frame, 'LOCAL (0) or WGS84 (1)')
     if origin is None:
         return None
