@@ -10,6 +10,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
 from uav_task_alloc.record.record_file import RECORD_FILE
+from uav_task_alloc.record.run_state import RunState
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 HUT = ThreatZone.cylinder('hut', (50.0, 0.0), 5.0)
@@ -178,3 +179,48 @@ def test_the_report_command_refuses_a_folder_without_a_run(tmp_path, monkeypatch
         report.main([str(tmp_path / 'none')])
     with pytest.raises(SystemExit, match='2'):
         report.main([])
+
+
+@pytest.mark.parametrize(('name', 'cut', 'warning'), [
+    (RECORD_FILE, -5, 'record.jsonl is cut: its last line is not finished'),
+    (RECORD_FILE, 0, 'record.jsonl is empty'), (TRUTH_FILE, 0, 'flight.jsonl is empty'),
+    (TRUTH_FILE, -5, 'flight.jsonl is cut: its last line is not finished')])
+def test_the_report_command_warns_of_a_cut_or_empty_file(
+        run, tmp_path, capsys, name, cut, warning):
+    run(ALL_DONE)
+    data = (tmp_path / name).read_bytes()
+    assert report.main([str(tmp_path)]) == 0
+    assert capsys.readouterr().err == ''
+    (tmp_path / name).write_bytes(data[:cut])
+    assert report.main([str(tmp_path)]) == 0
+    assert f'Warning: {warning}' in capsys.readouterr().err
+
+
+def test_the_report_command_warns_where_a_file_ends_before_the_run(run, tmp_path, capsys):
+    run([*ALL_DONE[:4], status('e', 'ACTIVE')])
+    with (tmp_path / RECORD_FILE).open('a') as file:
+        file.write(json.dumps({'wall': 50.0, 'kind': 'zones', 'zones': []}) + '\n')
+    assert report.main([str(tmp_path)]) == 0
+    assert capsys.readouterr().err.splitlines() == [
+        'Warning: record.jsonl ends while 1 of 5 tasks are open',
+        'Warning: flight.jsonl ends 46 s before record.jsonl']
+
+
+def trip(wall, tasks, distance):
+    return {'wall': wall, 'kind': 'list', 'uav': 'u1', 'distance': distance, 'tasks': [
+        {'id': name, 'leg_distance': 60.0} for name in tasks]}
+
+
+@pytest.mark.parametrize(('mode', 'planned'), [
+    (None, 320.0), ('STANDBY', 320.0), ('RETURNING', 190.0)])
+def test_each_flight_home_is_planned_length_but_one_that_was_given_up(mode, planned):
+    state = RunState()
+    state.apply(trip(1.0, 'a', 190.0))
+    state.apply(trip(2.0, '', 130.0))
+    if mode:
+        state.apply({'wall': 2.5, 'kind': 'state', 'uav': 'u1', 'mode': mode,
+                     'mission_state': 'VERIFIED', 'list_revision': 2})
+    state.apply(trip(3.0, 'b', 190.0))
+    state.apply(trip(4.0, '', 130.0))
+    state.apply({'wall': 5.0, 'kind': 'statuses', 'statuses': [status('a', 'COMPLETED')]})
+    assert report.planned_length(state, ['a']) == planned

@@ -17,6 +17,7 @@ from uav_task_alloc.cli.progress import log_line
 from uav_task_alloc.errors import AllocError, InvalidValue, damage
 from uav_task_alloc.map_files.write import flight_shapes, write_map
 from uav_task_alloc.record.ground_truth import (
+    TRUTH_FILE,
     GroundTruth,
     Reached,
     TrueSample,
@@ -24,6 +25,8 @@ from uav_task_alloc.record.ground_truth import (
     zone_entries,
 )
 from uav_task_alloc.record.piece_passes import piece_passes, served
+from uav_task_alloc.record.record_file import RECORD_FILE, unfinished
+from uav_task_alloc.record.reported import FINAL_STATES
 from uav_task_alloc.record.run_state import RunState
 
 Summary = dict[str, Any]
@@ -131,7 +134,7 @@ def planned_length(state: RunState, completed: Sequence[str]) -> float:
         piece: row for piece, row in state.pieces.items() if row.state == 'COMPLETED'}}
     legs = [state.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
     home = [line['distance'] or 0.0 for line in state.lists.values() if not line['tasks']]
-    return math.fsum(legs) + math.fsum(home)
+    return math.fsum([*legs, *home, *state.homeward.values()])
 
 
 def percentile(values: Sequence[float], share: float) -> float:
@@ -213,6 +216,20 @@ def flight_page(bag: Path, html: Path, flown: Path | None, namespace: str | None
     return 0
 
 
+def warn_of_ends(out: Path, run: RunState, truth: GroundTruth) -> None:
+    """Say where the files of a demo end before the run did."""
+    for name in (RECORD_FILE, TRUTH_FILE):
+        for text in filter(None, [unfinished(out / name)]):
+            log_line(f'Warning: {name} {text}')
+    known = {**run.ended, **run.statuses}
+    still = sum(name not in known or known[name].state not in FINAL_STATES for name in run.tasks)
+    if still:
+        log_line(f'Warning: {RECORD_FILE} ends while {still} of {len(run.tasks)} tasks are open')
+    end = max((track[-1].wall for track in truth.tracks.values()), default=run.first)
+    if run.last - end > run.silent_after:
+        log_line(f'Warning: {TRUTH_FILE} ends {run.last - end:.0f} s before {RECORD_FILE}')
+
+
 def write_flown(path: Path | None, run: RunState,
                 tracks: Mapping[str, Sequence[TrueSample]]) -> None:
     """Write the map of a flight, if `--map` is given. Raises InvalidValue where it cannot."""
@@ -250,6 +267,7 @@ def demo_table(place: Path, flown: Path | None) -> int:
             summary = summarise(out) if place.is_dir() else json.loads(place.read_text())
             print(summary_table(summary), flush=True)
             run, truth = read_run(out)
+        warn_of_ends(out, run, truth)
         write_flown(flown, run, truth.tracks)
         check_installed('report', 'matplotlib')
         check_file('map', png)

@@ -159,7 +159,6 @@ def fly_scenario(args: argparse.Namespace) -> int:
     Raises:
         KeyboardInterrupt: the flight was stopped by a signal.
     """
-    started_at = time.monotonic()
     out = args.out
     load(args.scenario)  # an invalid one must not cost earlier results
     run_folder.prepare(out)
@@ -175,7 +174,7 @@ def fly_scenario(args: argparse.Namespace) -> int:
         raise KeyboardInterrupt
     faults += [f'{name} ended with status {code}' for name, code in codes.items()
                if code and not any(name in fault for fault in faults)]
-    faults += write_results(out, time.monotonic() - started_at)
+    faults += write_results(out)
     for fault in faults:
         print(f'FAULT: {fault}', file=sys.stderr)
     return 1 if faults else 0
@@ -193,12 +192,11 @@ def signal_handler(handler: Callable[[int, FrameType | None], None]) -> Iterator
             signal.signal(number, earlier)
 
 
-def write_results(out: Path, duration: float) -> list[str]:
-    """Write summary and map of a run of `duration` [s] into a folder; return its faults."""
+def write_results(out: Path) -> list[str]:
+    """Write summary and map of a run into a folder; return its faults."""
     from uav_task_alloc import plots  # imports matplotlib
     from uav_task_alloc.cli import report  # imports numba
     summary = report.summarise(out)
-    summary['wall_s'] = round(duration, 1)
     (out / run_folder.SUMMARY).write_text(json.dumps(summary, indent=2) + '\n')
     print(report.summary_table(summary))
     plots.draw_flight(out, out / run_folder.MAP)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from os import SEEK_END
 from pathlib import Path
 from typing import Any
 
@@ -28,3 +29,22 @@ def read_lines(path: Path) -> Iterable[Line]:
         for text in file:
             if text.endswith('\n'):
                 yield json.loads(text)
+
+
+def unfinished(path: Path) -> str:
+    """Say whether a file of JSON lines has a whole last line.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        What is wrong, as the rest of a sentence; '': nothing.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    with path.open('rb') as file:
+        if not file.seek(0, SEEK_END):
+            return 'is empty'
+        file.seek(-1, SEEK_END)
+        return '' if file.read() == b'\n' else 'is cut: its last line is not finished'

@@ -62,6 +62,7 @@ class RunState:
     waited: set[str] = field(default_factory=set)  # tasks at which a UAV waits for the next
     lists: dict[str, Line] = field(default_factory=dict)  # the newest of each UAV
     legs: dict[tuple[str, str], float] = field(default_factory=dict)  # [m], see on_list
+    homeward: dict[str, float] = field(default_factory=dict)  # [m] of flights home before the last
     uavs: dict[str, Line] = field(default_factory=dict)  # the newest state of each
     verified: dict[str, set[int]] = field(default_factory=dict)  # list revisions on board, by UAV
     upload_counts: dict[str, int] = field(default_factory=dict)  # by UAV, from diagnostics
@@ -235,7 +236,14 @@ class RunState:
         for before, row in zip((None, *rows), rows, strict=False):
             if row.get('wait', 0.0) > 0.0:
                 self.waited |= {row['id']} | ({before['id']} if before else set())
-        self.lists[line['uav']] = line
+        uav, last = line['uav'], self.lists.get(line['uav'])
+        if rows and last and not last['tasks'] and self._is_home(uav):
+            self.homeward[uav] = self.homeward.get(uav, 0.0) + (last['distance'] or 0.0)
+        self.lists[uav] = line
+
+    def _is_home(self, uav: str) -> bool:
+        """Whether a UAV has flown home, as far as is known."""
+        return uav not in self.uavs or self.uavs[uav]['mode'] in ('LANDING', 'STANDBY')
 
     def service(self, line: Line, row: Line) -> Service | None:
         """Return the planned service of a task of a list.
