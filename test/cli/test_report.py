@@ -105,7 +105,8 @@ def announced(action, name):
 
 @pytest.mark.parametrize(('actions', 'state', 'lost'), [
     (['CANCEL'], 'CANCELLED', []), (['CANCEL'], None, []), (['CANCEL'], 'COMPLETED', ['e']),
-    (['CANCEL'], 'ACTIVE', ['e']), (['CANCEL', 'ADD'], None, ['e'])])
+    (['CANCEL'], 'ACTIVE', ['e']), (['CANCEL', 'ADD'], 'CANCELLED', []),
+    (['CANCEL', 'ADD'], None, ['e'])])
 def test_a_task_is_cancelled_only_where_its_last_status_says_so(run, actions, state, lost):
     more = [status('e', state)] if state else []
     summary = run([*ALL_DONE[:4], *more], reached='abcd',

@@ -112,9 +112,8 @@ def fate(name: str, state: RunState, reached: bool) -> str:
         return 'completed'
     if status is not None and status.state in _LEFT_OUT and status.reason:
         return 'unassigned'
-    if name in state.cancelled and (status is None or status.state == 'CANCELLED'):
-        return 'cancelled'
-    return 'lost'
+    cancelled = name in state.cancelled if status is None else status.state == 'CANCELLED'
+    return 'cancelled' if cancelled else 'lost'
 
 
 def why_lost(name: str, state: RunState) -> str:

@@ -25,9 +25,9 @@ from uav_task_alloc.record.run_state import RunState
 _SAMPLE_PERIOD = 0.2  # [s] between the samples of a track, of height and battery
 MAX_EVENTS = 5000  # the newest are kept, and of the faults before them as many
 _ON_GROUND = frozenset({'', 'UNKNOWN', 'STANDBY'})  # modes
-# a step of a track is flown where speed [m/s], acceleration [m/s2], delay [s] and error [m] of its
-# ends explain it; others are jumps of the estimate
-_ACCELERATION, _DELAY, _ERROR = 3.0, 1.0, 2.0
+# a step of a track is flown where speed [m/s], acceleration [m/s2], delay [s of real time] and
+# error [m] of its ends explain it; others are jumps of the estimate
+_ACCELERATION, _DELAY, _ERROR = 3.0, 0.5, 2.0
 _OPEN_STATES = ('PENDING', 'ASSIGNED', 'ACTIVE')
 
 
@@ -166,7 +166,7 @@ class FlightHistory:
         speed = max(math.hypot(*state['velocity']) for state in (old, line))
         time = (after.wall - before.wall) * self.run.speedup
         return math.dist(before.point, after.point) <= (
-            speed * (time + _DELAY) + 0.5 * _ACCELERATION * time * time + _ERROR)
+            speed * (time + _DELAY * self.run.rate) + 0.5 * _ACCELERATION * time * time + _ERROR)
 
     def on_list(self, line: Line) -> None:
         """Record the leg to a task that has become the next, from the position of the UAV."""

@@ -115,11 +115,11 @@ class RunState:
             if line['action'] == 'CANCEL':
                 self.cancelled.add(task['id'])
             else:
-                if line['action'] == 'ADD':
-                    self.cancelled.discard(task['id'])
                 known = self.tasks.get(task['id'])
                 if known and line['action'] == 'ADD' and self._is_open(task['id']):
                     continue  # refused, or as it is already
+                if line['action'] == 'ADD':
+                    self.cancelled.discard(task['id'])
                 self.tasks[task['id']] = AnnouncedTask(
                     tuple(task['position']), known.wall if known else self._announced_at(line),
                     task.get('service', 0.0), task.get('earliest'), task.get('latest'),
