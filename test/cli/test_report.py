@@ -214,14 +214,17 @@ def trip(wall, tasks, distance):
 
 @pytest.mark.parametrize(('mode', 'planned'), [
     (None, 320.0), ('STANDBY', 320.0), ('RETURNING', 190.0)])
-def test_each_flight_home_is_planned_length_but_one_that_was_given_up(mode, planned):
+@pytest.mark.parametrize('empty', [130.0, 0.0])  # [m] of a list without tasks, where it has any
+def test_each_flight_home_is_planned_length_but_one_that_was_given_up(mode, planned, empty):
     state = RunState()
     state.apply(trip(1.0, 'a', 190.0))
-    state.apply(trip(2.0, '', 130.0))
+    state.apply(trip(2.0, '', empty))
     if mode:
         state.apply({'wall': 2.5, 'kind': 'state', 'uav': 'u1', 'mode': mode,
                      'mission_state': 'VERIFIED', 'list_revision': 2})
     state.apply(trip(3.0, 'b', 190.0))
-    state.apply(trip(4.0, '', 130.0))
+    if mode:
+        state.uavs['u1'] = {**state.uavs['u1'], 'mode': 'RETURNING'}
+    state.apply(trip(4.0, '', empty))
     state.apply({'wall': 5.0, 'kind': 'statuses', 'statuses': [status('a', 'COMPLETED')]})
     assert report.planned_length(state, ['a']) == planned

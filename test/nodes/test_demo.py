@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command of the demo up to the start of its nodes, and its end; `make demo` flies it."""
+import json
 import os
 import signal
 import socket
@@ -12,6 +13,7 @@ from types import SimpleNamespace
 import pytest
 from ament_index_python.packages import get_package_prefix
 
+from uav_task_alloc.cli import report
 from uav_task_alloc.nodes import demo
 from uav_task_alloc.nodes.ros import udp_ports
 from uav_task_alloc.nodes.ros.udp_ports import free_domain, free_port
@@ -163,3 +165,17 @@ def test_a_demo_that_is_interrupted_ends_its_nodes_without_a_traceback(tmp_path,
     for node in nodes:
         with pytest.raises(ProcessLookupError):
             os.kill(node, 0)
+
+
+def test_the_summary_of_a_demo_is_that_of_its_report(tmp_path, capsys):
+    lines = [{'wall': 1.0, 'kind': 'run', 'speedup': 1.0, 'simulated': True},
+             {'wall': 1.0, 'kind': 'announcement', 'action': 'ADD', 'tasks': [
+                 {'id': 'a', 'position': [0.0, 0.0, 9.0]}]},
+             {'wall': 2.0, 'kind': 'allocation', 'solve_ms': 5.0, 'trigger': '', 'lists': []},
+             {'wall': 41.0, 'kind': 'zones', 'zones': []}]
+    (tmp_path / 'record.jsonl').write_text(''.join(json.dumps(line) + '\n' for line in lines))
+    (tmp_path / 'flight.jsonl').write_text('')
+    assert demo.write_results(tmp_path) == ['tasks_lost = 1']
+    summary = json.loads((tmp_path / 'summary.json').read_text())
+    assert summary == report.summarise(tmp_path)
+    assert summary['wall_s'] == 40.0

@@ -132,8 +132,7 @@ def planned_length(state: RunState, completed: Sequence[str]) -> float:
     rows = {**{name: known[name] for name in completed}, **{
         piece: row for piece, row in state.pieces.items() if row.state == 'COMPLETED'}}
     legs = [state.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
-    home = [line['distance'] or 0.0 for line in state.lists.values() if not line['tasks']]
-    return math.fsum([*legs, *home, *state.homeward.values()])
+    return math.fsum(legs) + state.ways_home.total()
 
 
 def percentile(values: Sequence[float], share: float) -> float:

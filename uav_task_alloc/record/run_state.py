@@ -23,6 +23,7 @@ from uav_task_alloc.record.reported import (
     SolveRecord,
     ZoneInterval,
 )
+from uav_task_alloc.record.ways_home import WaysHome
 from uav_task_alloc.zone_codec import decode_zone
 
 # share by which a measured clock rate varies, and that of a real vehicle over a bad link
@@ -62,7 +63,7 @@ class RunState:
     waited: set[str] = field(default_factory=set)  # tasks at which a UAV waits for the next
     lists: dict[str, Line] = field(default_factory=dict)  # the newest of each UAV
     legs: dict[tuple[str, str], float] = field(default_factory=dict)  # [m], see on_list
-    homeward: dict[str, float] = field(default_factory=dict)  # [m] of flights home before the last
+    ways_home: WaysHome = field(default_factory=WaysHome)  # as planned
     uavs: dict[str, Line] = field(default_factory=dict)  # the newest state of each
     verified: dict[str, set[int]] = field(default_factory=dict)  # list revisions on board, by UAV
     upload_counts: dict[str, int] = field(default_factory=dict)  # by UAV, from diagnostics
@@ -236,14 +237,9 @@ class RunState:
         for before, row in zip((None, *rows), rows, strict=False):
             if row.get('wait', 0.0) > 0.0:
                 self.waited |= {row['id']} | ({before['id']} if before else set())
-        uav, last = line['uav'], self.lists.get(line['uav'])
-        if rows and last and not last['tasks'] and self._is_home(uav):
-            self.homeward[uav] = self.homeward.get(uav, 0.0) + (last['distance'] or 0.0)
+        uav = line['uav']
+        self.ways_home.note_list(line, self.lists.get(uav), self.uavs.get(uav, {}).get('mode', ''))
         self.lists[uav] = line
-
-    def _is_home(self, uav: str) -> bool:
-        """Whether a UAV has flown home, as far as is known."""
-        return uav not in self.uavs or self.uavs[uav]['mode'] in ('LANDING', 'STANDBY')
 
     def service(self, line: Line, row: Line) -> Service | None:
         """Return the planned service of a task of a list.
