@@ -368,8 +368,9 @@ def test_temperatures_follow_the_price_of_lateness_where_nothing_else_counts():
 @pytest.mark.parametrize('seed', range(12))
 def test_tasks_of_little_value_are_flown_in_the_best_order(seed):
     rng = random.Random(seed)
-    uav, *tasks = (make(name, (rng.uniform(-1e3, 1e3), rng.uniform(-1e3, 1e3), 30.0)) for make, name
-                   in [(Uav, 'u'), (Task, 't0'), (Task, 't1'), (Task, 't2'), (Task, 'other')])
+    uav, *tasks = (
+        make(name, (rng.uniform(-1e3, 1e3), rng.uniform(-1e3, 1e3), 30.0)) for make, name in [
+            (Uav, 'u'), (Task, 't0'), (Task, 't1'), (Task, 't2'), (Task, 'other')])
     tasks = [replace(tasks[0], value=100.0), *tasks[1:3],
              replace(tasks[3], value=100.0, required_capabilities={'camera'})]
     rules = {'objective': 'balanced', 'route_end': 'home', 'budget': 60.0}
