@@ -289,3 +289,13 @@ def test_no_leg_leads_over_a_task_beyond_the_altitude_limits(objective, limits):
                  max_iterations=50, budget=60.0, **limits)
     points = [point for leg in found.legs['u'] for point in leg.via]
     assert all(point[2] <= limits['altitude_max'] for point in points)
+
+
+@pytest.mark.parametrize(('option', 'value'), [
+    ('hard_range', 'no'), ('hard_range', None), ('weights', 5), ('stop', 5), ('on_iteration', 5),
+    ('clock', 5), ('locked', [('u1', ['t0'])]), ('locked', {'u1': None}), ('altitude_max', 'x'),
+    ('altitude_min', True)])
+def test_an_option_of_another_type_is_refused_by_name(option, value):
+    zone = ThreatZone.cylinder('z', (150.0, 20.0), 30.0)
+    with pytest.raises(InvalidValue, match=option):
+        quick([ONE], [Task('t0', (9.0, 9.0, 9.0))], [zone], **{option: value})

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uav_task_alloc.checks import check_point
+from uav_task_alloc.checks import check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.obstacles import Floats, Obstacles, containing_zones, pack
 from uav_task_alloc.geometry.scene import path_found
@@ -113,6 +113,8 @@ def check_limits(altitude_min: float, altitude_max: float) -> Floats:
     Raises:
         InvalidValue: they are reversed, or not numbers.
     """
+    check_number('altitude_min', altitude_min, -math.inf)
+    check_number('altitude_max', altitude_max, -math.inf)
     if not altitude_min <= altitude_max:
         raise InvalidValue('altitude_min, altitude_max', (altitude_min, altitude_max),
                            'altitude_min <= altitude_max')

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
+from numbers import Real
 
 from uav_task_alloc.checks import check_id, check_number, check_point, check_polygon
 from uav_task_alloc.errors import InvalidValue
@@ -61,8 +62,10 @@ class ThreatZone:
         if self.shape is not Shape.POLYGON:
             put(self, 'radius', check_number(place + 'radius', self.radius, 0.0, 1e7,
                                              open_low=True))
-        if self.shape is not Shape.HEMISPHERE and not self.z_min < self.z_max:
-            raise InvalidValue(place + 'z_min, z_max', (self.z_min, self.z_max), 'z_min < z_max')
+        ends = self.z_min, self.z_max
+        if self.shape is not Shape.HEMISPHERE and not (
+                all(isinstance(z, Real) for z in ends) and ends[0] < ends[1]):
+            raise InvalidValue(place + 'z_min, z_max', ends, 'z_min < z_max')
         # of other shapes they are not checked: messages may carry anything there
         put(self, 'vertices', check_polygon(place + 'vertices', self.vertices)
             if self.shape is Shape.POLYGON else ())
@@ -105,7 +108,10 @@ class ThreatZone:
         Raises:
             InvalidValue: a value is out of range.
         """
-        x, y = tuple(center)[:2]
+        try:
+            x, y = tuple(center)[:2]
+        except (TypeError, ValueError):
+            raise InvalidValue(f'zone {id}: center', center, 'two coordinates [m]') from None
         return cls(id, Shape.CYLINDER, (x, y, 0.0), radius, z_min, z_max, margin=margin)
 
     @classmethod
@@ -126,6 +132,9 @@ class ThreatZone:
         Raises:
             InvalidValue: a value is out of range, or the polygon is not simple.
         """
-        corners = tuple(tuple(v)[:2] for v in vertices)
+        try:
+            corners = tuple(tuple(v)[:2] for v in vertices)
+        except TypeError:
+            raise InvalidValue(f'zone {id}: vertices', vertices, 'points (x, y) [m]') from None
         return cls(id, Shape.POLYGON, (0.0, 0.0, 0.0), 0.0, z_min, z_max,
                    corners, margin)  # type: ignore[arg-type]

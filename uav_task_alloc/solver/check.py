@@ -9,7 +9,7 @@ from typing import TypeVar
 from uav_task_alloc.checks import check_names, check_number
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone, Uav
-from uav_task_alloc.objective import MAX_TRIPS
+from uav_task_alloc.objective import MAX_TRIPS, Weights
 from uav_task_alloc.separation.rule import Separation
 
 _Named = TypeVar('_Named', Task, Uav, ThreatZone)
@@ -50,6 +50,25 @@ def check_options(budget: float, seed: int, route_end: str, threads: int,
         raise InvalidValue('max_iterations', max_iterations, 'an integer in [0, inf) or None')
 
 
+def check_types(hard_range: bool, weights: Weights | None, **functions: object) -> None:
+    """Check the options of `plan` that are no numbers.
+
+    Args:
+        hard_range, weights: as of `plan`.
+        functions: by name; None: it is not given.
+
+    Raises:
+        InvalidValue: one is of another type.
+    """
+    if not isinstance(hard_range, bool):
+        raise InvalidValue('hard_range', hard_range, 'True or False')
+    if weights is not None and not isinstance(weights, Weights):
+        raise InvalidValue('weights', weights, 'Weights or None')
+    for name, function in functions.items():
+        if function is not None and not callable(function):
+            raise InvalidValue(name, function, 'a function')
+
+
 def check_locked(locked: Mapping[str, Sequence[str]] | None, uavs: Sequence[Uav],
                  tasks: Sequence[Task]) -> dict[str, tuple[Task, ...]]:
     """Locked tasks by UAV id; unknown UAVs and tasks are ignored.
@@ -57,13 +76,15 @@ def check_locked(locked: Mapping[str, Sequence[str]] | None, uavs: Sequence[Uav]
     Raises:
         InvalidValue: a task is locked to two UAVs.
     """
+    if locked is not None and not isinstance(locked, Mapping):
+        raise InvalidValue('locked', locked, 'task ids by UAV id, or None')
     if not locked:
         return {}
     known, holder = {task.id: task for task in tasks}, dict[str, str]()
     held: dict[str, tuple[Task, ...]] = {}
     for uav in uavs:
         wanted = locked.get(uav.id, ())
-        if isinstance(wanted, str):
+        if isinstance(wanted, str) or not isinstance(wanted, Iterable):
             raise InvalidValue(f'locked[{uav.id}]', wanted, 'a sequence of task ids')
         row = [known[task_id] for task_id in dict.fromkeys(wanted) if task_id in known]
         for task in row:

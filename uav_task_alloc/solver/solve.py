@@ -22,6 +22,7 @@ from uav_task_alloc.solver.check import (
     check_options,
     check_reversed,
     check_separation,
+    check_types,
     check_unique,
 )
 from uav_task_alloc.solver.insertion import place_all
@@ -89,6 +90,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     """
     _check_solver(solver)
     check_options(budget, seed, route_end, threads, max_iterations, trips)
+    check_types(hard_range, weights, stop=stop, on_iteration=on_iteration, clock=clock)
     if not isinstance(warm, (Plan, WarmState, type(None))):
         raise InvalidValue('warm', type(warm).__name__, 'a Plan, its state or None')
     fleet, work = check_unique('uav', uavs, Uav), check_unique('task', tasks, Task)
