@@ -287,6 +287,30 @@ def test_the_page_has_the_origin_of_the_fleet_and_the_tiles_of_the_parameter(
     assert view.stop()[0] == 0
 
 
+def wgs84_task(latitude, longitude, value=1.0):
+    return m.Task(task_id='w', frame=m.Task.WGS84, latitude=latitude, longitude=longitude,
+                  altitude=3.0, value=value)
+
+
+def test_tasks_in_wgs84_wait_for_the_origin_and_refused_ones_move_nothing(start, probe):
+    view = start('live_view', '-p', 'port:=0')
+    tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    for action, each in ((m.TaskAnnouncement.ADD, wgs84_task(-33.9, 151.2)),
+                         (m.TaskAnnouncement.UPDATE, wgs84_task(-33.8, 151.2, value=0.0)),
+                         (9, wgs84_task(-33.8, 151.2)), (m.TaskAnnouncement.ADD, ADD.tasks[0])):
+        tasks.publish(m.TaskAnnouncement(action=action, tasks=[each]))
+    probe.until(lambda: 'wait for fleet_origin' in view.output(), 20.0, view.output)
+    assert 'tasks' not in page_of(view, 'at?wall=9e9')['parts']
+    probe.publisher(m.FleetOrigin, 'fleet_origin', LATCHED).publish(
+        m.FleetOrigin(latitude=-33.9, longitude=151.2, altitude_amsl=7.0))
+    probe.until(lambda: 't1' in page_of(view, 'at?wall=9e9')['parts'].get('tasks', ()), 20.0,
+                view.output)
+    assert page_of(view, 'at?wall=9e9')['parts']['tasks'] == {
+        'w': [0.0, 0.0, 3.0], 't1': [10.0, 20.0, 30.0]}
+    assert 'task_announcements: action = 9: expected' in view.output()
+    assert view.stop()[0] == 0
+
+
 def test_a_folder_without_tiles_is_refused(start, probe):
     view = start('live_view', '-p', 'port:=0', '-p', 'tiles:=/no/such/folder')
     probe.until(lambda: view.popen.poll() is not None, 20.0, view.output)

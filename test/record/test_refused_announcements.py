@@ -2,6 +2,8 @@
 """What the allocator refuses changes nothing of a recorded run: tasks announced twice, zones."""
 from types import SimpleNamespace
 
+import pytest
+
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record.message_records import zones_record
 from uav_task_alloc.record.run_state import RunState
@@ -26,9 +28,29 @@ def test_a_second_add_of_an_open_task_moves_nothing():
     assert run.tasks['t1'].position == (100.0, 0.0, 50.0)
     announce(run, 'UPDATE', 200.0, 4.0)
     assert run.tasks['t1'].position == (200.0, 0.0, 50.0)
-    status(run, 'COMPLETED')
-    announce(run, 'ADD', 900.0, 5.0)
+
+
+@pytest.mark.parametrize('state', ['COMPLETED', 'CANCELLED'])
+def test_a_task_that_has_ended_moves_only_after_the_allocator_has_forgotten_it(state):
+    run = RunState()
+    announce(run, 'ADD', 100.0, 1.0)
+    status(run, state)
+    announce(run, 'UPDATE', 900.0, 3.0)
+    announce(run, 'ADD', 900.0, 4.0)
+    assert run.tasks['t1'].position == (100.0, 0.0, 50.0)
+    run.apply({'kind': 'statuses', 'wall': 5.0, 'statuses': []})
+    announce(run, 'ADD', 900.0, 6.0)
     assert run.tasks['t1'].position == (900.0, 0.0, 50.0)
+
+
+def test_a_failed_task_moves_by_an_update_and_not_by_an_add():
+    run = RunState()
+    announce(run, 'ADD', 100.0, 1.0)
+    status(run, 'FAILED')
+    announce(run, 'ADD', 900.0, 3.0)
+    assert run.tasks['t1'].position == (100.0, 0.0, 50.0)
+    announce(run, 'UPDATE', 200.0, 4.0)
+    assert run.tasks['t1'].position == (200.0, 0.0, 50.0)
 
 
 def zone_message(zone_id, margin):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -22,6 +23,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
 from uav_task_alloc.live.tiles import tile_source
+from uav_task_alloc.nodes.conversions.announcements import is_in_wgs84, valid_tasks
 from uav_task_alloc.nodes.conversions.message_limits import cut
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.clock_watch import (
@@ -49,6 +51,7 @@ _Message = TypeVar('_Message')
 _BEGIN_PERIOD = 0.05  # [s] between two checks whether there is a time
 _PERIOD = 0.5  # [s] between updates of terminal and page
 _PLAIN_PERIODS = 4  # between two lines where the output is no terminal
+_TASKS = 'task_announcements'  # topic
 _MOST_REFUSALS = 200  # lines of the log
 _UP_AND_CLEAR = '\x1b[{}F\x1b[J'
 _STATE_FIELDS = ('mode', 'mission_state', 'active', 'list_revision', 'available', 'authority',
@@ -95,8 +98,8 @@ class LiveView(Node):
         super().__init__('live_view')
         self.params = declare(self, LiveViewParams).now
         self.played = scenario.load(self.params.scenario) if self.params.scenario else None
-        self.origin = self.played.origin if self.played else scenario.values.DEFAULT_ORIGIN
         self.state = RunState()
+        self.held: deque[m.TaskAnnouncement] = deque()  # until the origin is known
         self.logged_refusals: set[tuple[str, str]] = set()  # topic and reason
         self.scene, self.snapshots = Scene(self.state), SnapshotStore()
         self.terminal = TerminalStatus()
@@ -120,7 +123,7 @@ class LiveView(Node):
         self.apply({'wall': self.now(), 'kind': 'run', 'speedup': self.params.speedup,
                     'simulated': is_simulated(self)})
         if self.played:
-            self.apply({'wall': self.now(), 'kind': 'origin', **asdict(self.origin)})
+            self.apply({'wall': self.now(), 'kind': 'origin', **asdict(self.played.origin)})
         self._create_subscriptions()
         self.create_timer(_PERIOD, self.on_timer, clock=steady_clock())
 
@@ -130,10 +133,8 @@ class LiveView(Node):
 
     def _create_subscriptions(self) -> None:
         """Subscribe to all topics of a fleet; the lists of other UAVs follow their states."""
-        self._subscribe(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
-                        lambda msg: message_records.announcement_record(
-                            msg, self.state.origin or self.origin))
-        self._subscribe(m.FleetOrigin, 'fleet_origin', LATCHED, message_records.origin_record)
+        self.create_subscription(m.TaskAnnouncement, _TASKS, self.on_announcement, ANNOUNCEMENTS)
+        self.create_subscription(m.FleetOrigin, 'fleet_origin', self.on_origin, LATCHED)
         self._subscribe(m.ThreatZoneArray, 'threat_zones', LATCHED, message_records.zones_record)
         self._subscribe(m.TaskStatusArray, 'task_statuses', LATCHED,
                         message_records.statuses_record)
@@ -162,6 +163,37 @@ class LiveView(Node):
         except InvalidValue as error:  # its state is shown nevertheless
             return self.log_refusal('task_list', error)
         self._subscribe(m.TaskList, topic, LATCHED, message_records.task_list_record)
+
+    def on_announcement(self, msg: m.TaskAnnouncement) -> None:
+        """Record an announcement, and first hold one in WGS84 until the origin is known.
+
+        What is announced after one that is held is held, too: the order counts.
+        """
+        if self.state.origin is None and (self.held or is_in_wgs84(msg)):
+            self._guard(_TASKS, lambda: self.hold(msg))
+        else:
+            self._guard(_TASKS, lambda: self.apply_announcement(msg))
+
+    def hold(self, msg: m.TaskAnnouncement) -> None:
+        """Hold an announcement, up to as many as the topic keeps."""
+        if len(self.held) >= ANNOUNCEMENTS.depth:
+            raise InvalidValue('fleet_origin', 'unknown', 'an origin for tasks in WGS84')
+        if not self.held:
+            self.get_logger().info('tasks in WGS84, and later ones, wait for fleet_origin')
+        self.held.append(msg)
+
+    def apply_announcement(self, msg: m.TaskAnnouncement) -> None:
+        """Record what is valid of an announcement; the allocator reports the rest."""
+        origin = self.state.origin
+        line = message_records.announcement_record(valid_tasks(msg, origin), origin)
+        self.apply({'wall': self.now(), **line})
+
+    def on_origin(self, msg: m.FleetOrigin) -> None:
+        """Record the origin, then the announcements that waited for it."""
+        self._guard('fleet_origin', lambda: self.apply(
+            {'wall': self.now(), **message_records.origin_record(msg)}))
+        while self.held and self.state.origin is not None:
+            self.on_announcement(self.held.popleft())
 
     def on_state(self, msg: m.UavState) -> None:
         """Record the state of a UAV."""

@@ -29,7 +29,6 @@ from uav_task_alloc.zone_codec import decode_zone
 # share by which a measured clock rate varies, and that of a real vehicle over a bad link
 _RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
 _MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
-_OPEN = frozenset({'PENDING', 'ASSIGNED', 'ACTIVE', 'UNASSIGNED'})
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
 
@@ -117,8 +116,8 @@ class RunState:
                 self.cancelled.add(task['id'])
             else:
                 known = self.tasks.get(task['id'])
-                if known and line['action'] == 'ADD' and self._is_open(task['id']):
-                    continue  # refused, or as it is already
+                if known and self._is_refused(task['id'], line['action']):
+                    continue
                 if line['action'] == 'ADD':
                     self.cancelled.discard(task['id'])
                 self.tasks[task['id']] = AnnouncedTask(
@@ -163,10 +162,12 @@ class RunState:
         """
         return self.statuses.get(task) or self.ended.get(task)
 
-    def _is_open(self, task_id: str) -> bool:
-        """Whether the allocator has the task, so that only an UPDATE changes it."""
+    def _is_refused(self, task_id: str, action: str) -> bool:
+        """Whether the allocator refuses an ADD or UPDATE of a task that it has, or had."""
         status = self.statuses.get(task_id)
-        return status is not None and status.state in _OPEN
+        if status is None or status.state == 'REJECTED':
+            return False
+        return action == 'ADD' or status.state in ('COMPLETED', 'CANCELLED')
 
     def on_statuses(self, line: Line) -> None:
         """The statuses of all tasks."""

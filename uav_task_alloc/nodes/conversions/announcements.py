@@ -23,6 +23,8 @@ from uav_task_alloc.nodes.conversions.work_fields import (
 from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.work.values import MOST_HOLES, Kind, Vertical
 
+_ANY_ORIGIN = Origin(0.0, 0.0, 0.0)  # tasks in LOCAL do not depend on it
+
 
 def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float,
              now: float) -> list[TaskVerdict]:
@@ -65,6 +67,45 @@ def to_action(msg: m.TaskAnnouncement) -> AnnouncementAction:
     action = check_member('action', msg.action, AnnouncementAction)
     check_count('tasks', msg.tasks, MOST_TASKS)
     return action
+
+
+def is_in_wgs84(msg: m.TaskAnnouncement) -> bool:
+    """Return whether an announcement has places that depend on the origin.
+
+    Args:
+        msg: not yet checked.
+
+    Returns:
+        False where it cancels tasks.
+    """
+    return msg.action != m.TaskAnnouncement.CANCEL and any(
+        task.frame == m.Task.WGS84 for task in msg.tasks)
+
+
+def valid_tasks(msg: m.TaskAnnouncement, origin: Origin | None) -> m.TaskAnnouncement:
+    """Return an announcement without the tasks that the allocator refuses by their fields.
+
+    Args:
+        msg: from any publisher, not yet checked.
+        origin: of the ENU frame; None: no task is in WGS84, see `is_in_wgs84`.
+
+    Returns:
+        Another message with the same action.
+
+    Raises:
+        InvalidValue: the action is unknown, or there are too many tasks.
+    """
+    if to_action(msg) is AnnouncementAction.CANCEL:
+        return msg
+
+    def is_valid(task: m.Task) -> bool:
+        try:
+            to_work(task, origin or _ANY_ORIGIN)
+        except InvalidValue:
+            return False
+        return True
+
+    return m.TaskAnnouncement(action=msg.action, tasks=list(filter(is_valid, msg.tasks)))
 
 
 def from_verdicts(verdicts: list[TaskVerdict],
