@@ -315,3 +315,10 @@ def test_an_area_has_its_outline_its_strips_and_those_that_are_flown():
                                   with_ways(listed(BEGIN + 9.0, 'u1', 2, ['field#2']))])
     assert parts['works']['field']['done'] == 1
     assert parts['works']['field']['strips'] == [[[0.0, 10.0, 40.0], [200.0, 10.0, 40.0]]]
+
+
+def test_the_state_of_a_piece_is_one_event():
+    flown = {'field': 'ACTIVE', 'field#1': 'COMPLETED u1', 'field#2': 'ACTIVE u1'}
+    first, then = statuses(BEGIN + 1, **flown), statuses(BEGIN + 2, **flown)
+    assert 'field#1 completed by u1' in event_texts(FIRST, [first])
+    assert event_texts(FIRST, [first], [then]) == []

@@ -5,6 +5,7 @@ import math
 import re
 import socket
 import urllib.request
+from types import SimpleNamespace
 
 import pytest
 from builtin_interfaces.msg import Duration
@@ -21,6 +22,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     announcement,
     from_zones,
 )
+from uav_task_alloc.nodes.live_view import LiveView
 from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.record import diagnostic_records, message_records, run_state
 from uav_task_alloc.record.reported import ReportedStatus
@@ -198,10 +200,23 @@ def test_the_duration_of_authority_is_a_number_or_unknown(given, seconds):
     assert (authority['for'], authority['back']) == (seconds, '')
 
 
-@pytest.mark.parametrize('given', ['unknown', 'nan', 'inf', '0.0', '-1.0', ''])
+@pytest.mark.parametrize('given', ['unknown', 'nan', 'inf', '0.0', '-1.0', '', '0.003', '1e308'])
 def test_a_clock_rate_is_a_positive_number_or_unknown(given):
     status = DiagnosticStatus(hardware_id='u', values=[KeyValue(key='clock_rate', value=given)])
     assert diagnostic_records.uploads_record(DiagnosticArray(status=[status]))['clock_rates'] == {}
+
+
+@pytest.mark.parametrize(('namespace', 'names'), [
+    ('/', ['/allocator', 'bridge: /far/u1']), ('/north', ['/north/mavlink_bridge: u1'])])
+def test_diagnostics_of_another_fleet_are_left_out(namespace, names):
+    msg = DiagnosticArray(status=[DiagnosticStatus(name=name, hardware_id='u1') for name in (
+        '/allocator', '/north/mavlink_bridge: u1', '/northern/allocator', 'bridge: /far/u1')])
+    assert [each.name for each in diagnostic_records.of_namespace(msg, namespace)] == names
+
+
+def test_a_velocity_beyond_all_bounds_is_unknown():
+    line = message_records.state_record(state(speed=1.7e308))
+    assert line['velocity'] == [None, 0.0, 0.0]
 
 
 def test_a_state_record_has_the_authority():
@@ -308,6 +323,32 @@ def test_tasks_in_wgs84_wait_for_the_origin_and_refused_ones_move_nothing(start,
     assert page_of(view, 'at?wall=9e9')['parts']['tasks'] == {
         'w': [0.0, 0.0, 3.0], 't1': [10.0, 20.0, 30.0]}
     assert 'task_announcements: action = 9: expected' in view.output()
+    assert view.stop()[0] == 0
+
+
+def test_an_update_that_fails_is_logged_and_ends_nothing():
+    def fail(*_):
+        raise ValueError('why')
+
+    done = []
+    view = SimpleNamespace(
+        clock=lambda: 0.0, now=lambda: 0.0, is_finished=lambda _: False, state=None,
+        terminal=SimpleNamespace(update=fail), update_page=lambda: done.append('page'),
+        _to_record=lambda _: done.append('record'),
+        log_refusal=lambda what, error: done.append(f'{what}: {error}'))
+    view._guard = lambda what, update: LiveView._guard(view, what, update)
+    LiveView.on_timer(view)
+    assert done == ['terminal: why', 'page', 'record']
+
+
+def test_a_full_disk_ends_the_record_and_not_the_view(start, probe, tmp_path):
+    (tmp_path / 'record.jsonl').symlink_to('/dev/full')
+    view = start('live_view', '-p', f'out_dir:={tmp_path}', '-p', 'page:=false')
+    plans = probe.publisher(m.Allocation, 'allocation', LATCHED)
+    probe.until(lambda: 'No space left on device: the record ends' in view.output(), 20.0,
+                view.output)
+    plans.publish(m.Allocation(revision=1, trigger='\x1b[2J'))
+    probe.until(lambda: 'ms (?[2J)' in view.output(), 20.0, view.output)
     assert view.stop()[0] == 0
 
 

@@ -9,7 +9,7 @@ from uav_task_alloc import scenario
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record.ground_truth import GroundTruth, visits, zone_entries
 from uav_task_alloc.record.progress import fleet_lines, headline, run_is_over
-from uav_task_alloc.record.record_file import RECORD_FILE
+from uav_task_alloc.record.record_file import RECORD_FILE, RecordWriter, read_lines
 from uav_task_alloc.record.reported import ZoneInterval
 from uav_task_alloc.record.run_state import RunState, read_record
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
@@ -280,3 +280,14 @@ def test_the_places_of_waits_are_those_of_the_task_and_of_the_stop_before():
     run.apply({'kind': 'list', 'wall': 1.0, 'uav': 'u1', 'revision': 1, 'distance': 0.0,
                'stamp': 1.0, 'tasks': rows})
     assert run.waited == {'a', 'b'}
+
+
+def test_a_record_that_is_there_already_is_moved_and_never_overwritten(tmp_path):
+    for k in range(3):
+        record = RecordWriter(tmp_path / 'out')
+        record.write({'wall': float(k)})
+        record.close()
+    assert record.earlier == tmp_path / 'out/earlier_2'
+    assert [list(read_lines(folder / RECORD_FILE)) for folder in (
+        tmp_path / 'out/earlier_1', tmp_path / 'out/earlier_2', tmp_path / 'out')] == [
+        [{'wall': 0.0}], [{'wall': 1.0}], [{'wall': 2.0}]]

@@ -2,14 +2,13 @@
 """Shows a fleet in the terminal and in the browser, records it, and ends with its scenario."""
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
@@ -24,7 +23,7 @@ from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
 from uav_task_alloc.live.tiles import tile_source
 from uav_task_alloc.nodes.conversions.announcements import is_in_wgs84, valid_tasks
-from uav_task_alloc.nodes.conversions.message_limits import cut
+from uav_task_alloc.nodes.conversions.message_limits import cut, printable
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.clock_watch import (
     SteadyTime,
@@ -40,7 +39,7 @@ from uav_task_alloc.params import LiveViewParams
 from uav_task_alloc.record import diagnostic_records, message_records
 from uav_task_alloc.record.message_records import RecordBody
 from uav_task_alloc.record.progress import fleet_lines, headline, run_is_over
-from uav_task_alloc.record.record_file import RECORD_FILE
+from uav_task_alloc.record.record_file import RecordWriter
 from uav_task_alloc.record.run_state import RunState
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ class TerminalStatus:
             self._lines = len(lines)
         elif self._updates % _PLAIN_PERIODS and not last:
             return
-        print('\n'.join(lines), flush=True)
+        print('\n'.join(map(printable, lines)), flush=True)
 
 
 class LiveView(Node):
@@ -103,7 +102,7 @@ class LiveView(Node):
         self.logged_refusals: set[tuple[str, str]] = set()  # topic and reason
         self.scene, self.snapshots = Scene(self.state), SnapshotStore()
         self.terminal = TerminalStatus()
-        self.file = self._open_record()
+        self.record = self._open_record()
         self.recorder = self._start_recorder()
         self.finished = False
         self.over_since: float | None = None  # [s] of the scenario
@@ -143,7 +142,7 @@ class LiveView(Node):
         self._subscribe(m.PlanProposal, 'plan_proposal', LATCHED, message_records.proposal_record)
         self._subscribe(m.SeparationAlert, 'separation_alerts', EVENTS,
                         message_records.separation_record)
-        self._subscribe(DiagnosticArray, '/diagnostics', 10, diagnostic_records.uploads_record)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self.on_fleet_diagnostics, 10)
         self.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
         for uav in self.played.uavs if self.played else ():
             self.subscribe_list(uav.id)
@@ -195,6 +194,13 @@ class LiveView(Node):
         while self.held and self.state.origin is not None:
             self.on_announcement(self.held.popleft())
 
+    def on_fleet_diagnostics(self, msg: DiagnosticArray) -> None:
+        """Record what the nodes of this fleet report of themselves."""
+        msg.status = diagnostic_records.of_namespace(msg, self.get_namespace())
+        if msg.status:
+            self._guard('/diagnostics', lambda: self.apply(
+                {'wall': self.now(), **diagnostic_records.uploads_record(msg)}))
+
     def on_state(self, msg: m.UavState) -> None:
         """Record the state of a UAV."""
         self._guard('uav_states', lambda: self.apply_state(msg))
@@ -220,7 +226,7 @@ class LiveView(Node):
 
     def log_refusal(self, topic: str, error: Exception) -> None:
         """Log why a message is refused, each reason of a topic once."""
-        reason = str(error) if isinstance(error, InvalidValue) else cut(
+        reason = printable(str(error)) if isinstance(error, InvalidValue) else cut(
             f'{type(error).__name__}: {error}')
         refusal = topic, reason
         if len(self.logged_refusals) < _MOST_REFUSALS and refusal not in self.logged_refusals:
@@ -230,17 +236,27 @@ class LiveView(Node):
     def apply(self, line: RecordBody) -> None:
         """Apply a line to the state of the run, and write it to the record."""
         self.scene.apply(line)
-        if self.file:
-            self.file.write(json.dumps(line) + '\n')
+        self._to_record(lambda record: record.write(line))
+
+    def _to_record(self, write: Callable[[RecordWriter], None]) -> None:
+        """Write to the record, if there is one; it ends where that fails, and the node goes on."""
+        if self.record is None:
+            return
+        try:
+            write(self.record)
+        except OSError as error:
+            self.get_logger().error(f'out_dir: {error}: the record ends, the node goes on')
+            self.record.close()
+            self.record = None
 
     def on_timer(self) -> None:
         """Update terminal and page, and finish some time after the scenario is over."""
         clock = self.clock()
         self.finished = self.is_finished(clock)
-        self.terminal.update(self.state, self.now(), clock, self.finished)
-        self.update_page()
-        if self.file:
-            self.file.flush()
+        self._guard('terminal', lambda: self.terminal.update(
+            self.state, self.now(), clock, self.finished))
+        self._guard('page', self.update_page)
+        self._to_record(RecordWriter.flush)
 
     def is_finished(self, clock: float) -> bool:
         """Whether the scenario has been over for the parameter `settle` [s]."""
@@ -264,13 +280,14 @@ class LiveView(Node):
         """Scenario time [s]: since the first task was announced."""
         return self.state.clock(self.now()) if self.state.tasks else 0.0
 
-    def _open_record(self) -> TextIO | None:
+    def _open_record(self) -> RecordWriter | None:
         if not self.params.out_dir:
             return None
-        folder = Path(self.params.out_dir)
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            return (folder / RECORD_FILE).open('w', encoding='utf-8')
+            record = RecordWriter(Path(self.params.out_dir))
+            if record.earlier:
+                self.get_logger().warning(f'out_dir: its record was moved to {record.earlier}')
+            return record
         except OSError as error:
             raise InvalidValue('out_dir', self.params.out_dir,
                                f'a folder that can be written to ({error})') from None
@@ -325,9 +342,9 @@ class LiveView(Node):
             self.server.stop()
         if self.recorder:
             self.recorder.stop()
-        if self.file:
-            self.file.close()
-            self.file = None
+        if self.record:
+            self.record.close()
+            self.record = None
         super().destroy_node()
 
 

@@ -10,6 +10,7 @@ from uav_task_alloc.record.message_records import RecordBody, finite_or_none
 
 _Message = Any
 
+_SLOWEST, _FASTEST = 0.01, 200.0  # a clock rate beyond is a fault of its measurement
 _COUNT = re.compile('[0-9]{1,18}')  # int() refuses some strings for which isdigit() is true
 UAV_WARNING = 'warning of '  # a key of an allocator begins so, and ends with the id of a UAV
 WAITING = 'waiting of '  # the same, of a UAV without tasks
@@ -18,11 +19,25 @@ BATTERY_RESERVE = 'battery reserve'  # key of an allocator: share, see its param
 NOTHING = 'nothing is needed'  # value of `given_back_by` while the bridge has authority
 
 
+def of_namespace(msg: _Message, namespace: str) -> list[_Message]:
+    """Return the statuses of the nodes of one fleet: `/diagnostics` is of all fleets.
+
+    Args:
+        msg: DiagnosticArray.
+        namespace: of the fleet; '/': none.
+
+    Returns:
+        Those whose names, before a colon, are full names of nodes in the namespace.
+    """
+    return [status for status in msg.status
+            if status.name.partition(':')[0].rpartition('/')[0] == namespace.rstrip('/')]
+
+
 def uploads_record(msg: _Message) -> RecordBody:
     """Return the bridge's values of a DiagnosticArray.
 
     Args:
-        msg: DiagnosticArray.
+        msg: DiagnosticArray of one fleet.
 
     Returns:
         Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text] by
@@ -83,7 +98,7 @@ def _clock_rates(msg: _Message) -> Iterable[tuple[str, float]]:
     for status in msg.status:
         for pair in status.values:
             rate = _seconds_or_none(pair.value) if pair.key == 'clock_rate' else None
-            if rate is not None and rate > 0.0:
+            if rate is not None and _SLOWEST <= rate <= _FASTEST:
                 yield status.hardware_id, rate
 
 

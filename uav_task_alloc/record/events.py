@@ -45,7 +45,7 @@ def status_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
     """Tasks in a new state; tasks of the same state, UAV and reason share a sentence."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for row in line['statuses']:
-        old = state.statuses.get(row['task'])
+        old = state.statuses.get(row['task']) or state.pieces.get(row['task'])
         if row['state'] in STATE_SENTENCES and (
                 old is None or (old.state, old.reason) != (row['state'], row['reason'])):
             groups.setdefault((row['state'], row['uav'], row['reason']), []).append(row['task'])

@@ -9,7 +9,7 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from uav_task_alloc.checks import check_number, check_point
+from uav_task_alloc.checks import FAR, check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point
@@ -270,15 +270,14 @@ def state_record(msg: _Message) -> RecordBody:
         msg: UavState; recordings of earlier versions lack some fields.
 
     Returns:
-        Kind `state`; unknown numbers are None.
+        Kind `state`; unknown numbers, and coordinates beyond FAR, are None.
     """
     return {'kind': 'state', 'uav': msg.uav_id, 'mode': constant_name(MODES, msg.mode),
             'mission_state': constant_name(MISSIONS, msg.mission_state),
             'active': piece_id(msg.active_task_id, getattr(msg, 'active_piece', 0)),
             'list_revision': msg.list_revision, 'battery': finite_or_none(msg.battery),
-            'position': [finite_or_none(v) for v in _xyz(msg.position)],
-            'velocity': [finite_or_none(v) for v in _xyz(msg.velocity)],
-            'home': [finite_or_none(v) for v in _xyz(msg.home)],
+            **{name: [v if abs(v) <= FAR else None for v in _xyz(getattr(msg, name))]
+               for name in ('position', 'velocity', 'home')},
             'range_remaining': finite_or_none(msg.range_remaining), 'available': msg.available,
             # missing in recordings of earlier versions
             'authority': constant_name(AUTHORITIES, getattr(msg, 'authority', 0)),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from itertools import count
 from os import SEEK_END
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,47 @@ from typing import Any
 RECORD_FILE = 'record.jsonl'
 # `wall`: time of the record, that of /clock where its node lives by simulated time
 Line = Mapping[str, Any]  # `wall` [unix s], `kind`, and the values that RunState.on_KIND reads
+
+
+class RecordWriter:
+    """Writes the record of a run; a record that is there already is moved, never overwritten.
+
+    It goes to `earlier_1`, `earlier_2`, ... in the folder. `earlier` is that folder; None: there
+    was no record.
+
+    Args:
+        folder: created where it does not exist.
+
+    Arguments of methods:
+        line: of the record.
+
+    Raises:
+        OSError: also by `write` and `flush`; the file cannot be written. Close it then.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / RECORD_FILE
+        self.earlier: Path | None = None
+        if path.exists() and path.stat().st_size > 0:
+            self.earlier = next(each for number in count(1)
+                                if not (each := folder / f'earlier_{number}').exists())
+            self.earlier.mkdir()
+            path.rename(self.earlier / RECORD_FILE)
+        self._file = path.open('w', encoding='utf-8')
+
+    def write(self, line: Line) -> None:
+        """Write a line, which may stay in memory until `flush`."""
+        self._file.write(json.dumps(line) + '\n')
+
+    def flush(self) -> None:
+        """Write to the disk what is in memory."""
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file, with what can still be written."""
+        with suppress(OSError):
+            self._file.close()
 
 
 def read_lines(path: Path) -> Iterable[Line]:
