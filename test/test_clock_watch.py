@@ -30,6 +30,14 @@ def test_a_clock_that_stands_still_is_logged_once_and_again_when_it_runs():
         '/clock runs again after 60 s']
 
 
+def test_a_watch_says_whether_the_clock_stands_still():
+    watch, still = ClockWatch(), []
+    for reading in ((9.0, 0.0), (10.0, 1.0), (10.0, 5.0), (10.0, 6.0), (11.0, 7.0)):
+        watch.update(*reading)
+        still.append(watch.still)
+    assert still == [False, False, False, True, False]
+
+
 def test_a_pause_between_two_ticks_is_not_mentioned():
     assert lines((10.0, 0.0), (10.0, 4.5), (11.0, 4.9)) == []
 

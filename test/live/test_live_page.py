@@ -192,6 +192,17 @@ def cut(server):
     server.snapshots.updates_since = broken
 
 
+def test_a_page_says_that_the_simulated_clock_stands_still(view, run):
+    page = view(run.snapshots)
+    run.clock['still'] = True
+    run.add(*uavs(BEGIN + 20))
+    wait(page, '#banner', 'The simulated clock stands still at 0:20')
+    assert text(page, '#state') == '✕ clock stands still'
+    run.clock['still'] = False
+    run.add(*uavs(BEGIN + 21))
+    page.wait_for_selector('#banner', state='hidden')
+
+
 @pytest.mark.parametrize(('ended', 'badge', 'words'), [
     (True, '■ run ended', 'Run ended at 0:20'), (False, '■ stopped', 'UAVs may still be flying')])
 def test_the_end_of_the_node_is_no_alarm(tab, run, serve, ended, badge, words):

@@ -125,6 +125,39 @@ def test_orders_and_the_plan_that_waits_for_an_operator_are_shown():
     assert updates(FIRST, [ordered], [ended])[0]['orders']['orders'] == []
 
 
+@pytest.mark.parametrize('ahead', [300.0, -300.0, 0.4])
+def test_times_are_those_of_the_page_where_its_computer_has_another_clock(ahead):
+    parts, _, _ = updates([
+        {'wall': BEGIN + ahead, 'kind': 'uploads', 'uploads': {}, 'stamp': BEGIN},
+        {**announced(BEGIN + ahead, []), 'tasks': [
+            {'id': 't1', 'position': [1.0, 2.0, 3.0], 'latest': BEGIN + 90.0}]},
+        {**listed(BEGIN + ahead, 'u1', 1, ['t1']), 'stamp': BEGIN},
+        {**PROPOSAL, 'wall': BEGIN + ahead}])
+    offset = ahead if abs(ahead) > 1.0 else 0.0
+    assert parts['list u1']['tasks'][0]['at'] == BEGIN + offset + 10.0
+    assert parts['times']['t1']['window'] == [None, BEGIN + offset + 90.0]
+    assert parts['orders']['proposal']['deadline'] == BEGIN + offset + 31.0
+
+
+def test_what_an_allocator_said_ends_when_it_does():
+    said = {'wall': BEGIN + 1.0, 'kind': 'uploads', 'uploads': {}, 'orders': {
+        '/allocator': {'o1': 'pin t1 to u1 (ann)'}}, 'uav_warnings': {
+            '/allocator': {'u1': 'inside zone x'}}}
+    plan = {**PROPOSAL, 'deadline': BEGIN + 900.0}
+    parts, _, _ = updates(FIRST, [said, plan], [state(BEGIN + 12.0, 'u2', (0.0, 0.0))])
+    assert parts['orders'] == {'proposal': None, 'orders': []}
+    assert parts['uavs']['u1']['health'] == ''
+    parts, _, _ = updates(FIRST, [said, plan], [state(BEGIN + 12.0, 'u2', (0.0, 0.0))],
+                          [{**said, 'wall': BEGIN + 13.0}])
+    assert parts['orders']['proposal']['revision'] == 7
+    assert parts['orders']['orders'] == [['o1', 'pin t1 to u1 (ann)']]
+
+
+def test_a_plan_does_not_wait_long_after_its_deadline():
+    parts, _, _ = updates(FIRST, [PROPOSAL], [state(BEGIN + 42.0, 'u2', (0.0, 0.0))])
+    assert parts['orders']['proposal'] is None
+
+
 def test_a_stamp_of_another_clock_is_ignored():
     line = {**FIRST[3], 'stamp': 17.0}  # simulated time
     assert updates([line])[0]['list u1']['tasks'][0]['at'] == BEGIN + 10.0

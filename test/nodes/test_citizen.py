@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point
 from uav_task_alloc_msgs import msg as m, srv
 
@@ -54,6 +55,14 @@ def test_the_policy_allows_what_a_node_does_and_no_more(start, probe, name, give
                                 for pattern in needed))  # noqa: B023
         assert {got for got in seen() if not any(fnmatch(got, p) for p in patterns)} == set()
     assert graph.get_client_names_and_types_by_node(name, '/') == []
+
+
+def test_the_diagnostics_of_a_bridge_have_its_full_name(start, probe):
+    start('mavlink_bridge', '-r', '__ns:=/north', *BRIDGE)
+    shown = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    probe.until(lambda: shown)
+    assert {status.name.partition(':')[0] for status in shown[0].status} == {
+        '/north/mavlink_bridge'}
 
 
 def test_an_operator_may_order_and_an_observer_may_not():

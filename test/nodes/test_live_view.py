@@ -219,6 +219,17 @@ def test_a_velocity_beyond_all_bounds_is_unknown():
     assert line['velocity'] == [None, 0.0, 0.0]
 
 
+def test_times_of_a_clock_that_went_back_are_moved_to_those_of_the_record():
+    line = message_records.shifted({
+        'kind': 'x', 'stamp': 10.0, 'deadline': 0.0, 'tasks': [
+            {'id': 't1', 'earliest': 20.0, 'eta': 5.0}],
+        'statuses': [{'task': 't1', 'expected': 30.0}]}, 300.0)
+    assert line == {
+        'kind': 'x', 'stamp': 310.0, 'deadline': 0.0, 'tasks': [
+            {'id': 't1', 'earliest': 320.0, 'eta': 5.0}],
+        'statuses': [{'task': 't1', 'expected': 330.0}]}
+
+
 def test_a_state_record_has_the_authority():
     line = message_records.state_record(m.UavState(authority=m.UavState.LOST, reason='why'))
     assert (line['authority'], line['reason']) == ('LOST', 'why')

@@ -49,6 +49,7 @@ class Scene:
         self.silent: set[str] = set()
         self.last_authority: LogEntry = {}
         self.last_orders: dict[str, dict[str, str]] = {}  # by allocator
+        self.waiting: Line | None = None  # the plan that waits for an operator
         self.last: LogEntry = {'times': {}, 'works': {}}  # these parts as last sent
 
     def apply(self, line: Line) -> None:
@@ -67,10 +68,11 @@ class Scene:
             self.dirty.add('times')
         elif kind == 'allocation':
             self.new_plans.append(line)
-        speedup = self.run.speedup
+        clocks = self.run.speedup, self.run.ahead
         self.run.apply(line)
-        if self.run.speedup != speedup:  # the arrivals of all lists are other times
-            self.dirty |= {f'list {uav}' for uav, each in self.run.lists.items() if each['tasks']}
+        if (self.run.speedup, self.run.ahead) != clocks:  # arrivals and windows are other times
+            self.dirty |= {'times', *(
+                f'list {uav}' for uav, each in self.run.lists.items() if each['tasks'])}
 
     def updates(self, now: float, ended: bool = False,
                 ) -> tuple[dict[str, Any], list[LogEntry], list[LogEntry]]:
@@ -88,8 +90,11 @@ class Scene:
         """
         plans = [self.plan(line) for line in self.new_plans]
         self.log_silence(now, ended)
-        if self.run.orders != self.last_orders:
-            self.last_orders = dict(self.run.orders)
+        if self.run.forget_silent(now):
+            self.dirty.add('uavs')
+        waiting = self.run.waiting_plan(now)
+        if (self.run.orders, waiting) != (self.last_orders, self.waiting):
+            self.last_orders, self.waiting = dict(self.run.orders), waiting
             self.dirty.add('orders')
         parts = {name: self.part(name) for name in self.dirty}
         for name, before in self.last.items():  # they rarely change
@@ -185,12 +190,12 @@ class Scene:
 
     def orders(self) -> LogEntry:
         """Orders in force, [id, text]; and the plan that waits for an operator, None for none."""
-        proposal = self.run.proposal
-        waiting = proposal is not None and proposal['open'] and {
-            'revision': proposal['revision'], 'trigger': proposal['trigger'],
-            'deadline': round(proposal['deadline']), 'accepted': proposal['accepted'],
-            'changes': proposal['changes']}
-        return {'proposal': waiting or None, 'orders': [
+        plan = self.waiting
+        proposal = plan and {
+            'revision': plan['revision'], 'trigger': plan['trigger'],
+            'deadline': round(plan['deadline'] + self.run.ahead), 'accepted': plan['accepted'],
+            'changes': plan['changes']}
+        return {'proposal': proposal, 'orders': [
             [name, text] for each in self.run.orders.values() for name, text in each.items()]}
 
     def list(self, uav: str) -> LogEntry:
@@ -240,7 +245,8 @@ class Scene:
             row = {**_span('planned', run.planned.get(name) if name in flown else None, uav=True),
                    **_span('flown', flown.get(name), uav=True)}
             if task.earliest is not None or task.latest is not None:
-                row['window'] = [task.earliest, task.latest]
+                row['window'] = [each and each + run.ahead
+                                 for each in (task.earliest, task.latest)]
             if row:
                 times[name] = row
         return times

@@ -109,7 +109,7 @@ class LiveView(Node):
         self.time = SteadyTime()
         self.begun = False  # waits for the first /clock where it lives by simulated time
         self.server = self._start_server()
-        watch_clock(self, self.get_logger().warning)
+        self.watch = watch_clock(self, self.get_logger().warning)
         self.begin_timer = self.create_timer(_BEGIN_PERIOD, self.begin, clock=steady_clock())
         self.begin()
 
@@ -151,7 +151,7 @@ class LiveView(Node):
                    to_record: Callable[[_Message], RecordBody]) -> None:
         """Record every message of a topic as `to_record` converts it."""
         def on_message(msg: _Message) -> None:
-            self._guard(topic, lambda: self.apply({'wall': self.now(), **to_record(msg)}))
+            self._guard(topic, lambda: self.apply(self.line(to_record(msg))))
         self.create_subscription(msg_type, topic, on_message, qos)
 
     def subscribe_list(self, uav_id: str) -> None:
@@ -185,12 +185,12 @@ class LiveView(Node):
         """Record what is valid of an announcement; the allocator reports the rest."""
         origin = self.state.origin
         line = message_records.announcement_record(valid_tasks(msg, origin), origin)
-        self.apply({'wall': self.now(), **line})
+        self.apply(self.line(line))
 
     def on_origin(self, msg: m.FleetOrigin) -> None:
         """Record the origin, then the announcements that waited for it."""
         self._guard('fleet_origin', lambda: self.apply(
-            {'wall': self.now(), **message_records.origin_record(msg)}))
+            self.line(message_records.origin_record(msg))))
         while self.held and self.state.origin is not None:
             self.on_announcement(self.held.popleft())
 
@@ -199,7 +199,7 @@ class LiveView(Node):
         msg.status = diagnostic_records.of_namespace(msg, self.get_namespace())
         if msg.status:
             self._guard('/diagnostics', lambda: self.apply(
-                {'wall': self.now(), **diagnostic_records.uploads_record(msg)}))
+                self.line(diagnostic_records.uploads_record(msg))))
 
     def on_state(self, msg: m.UavState) -> None:
         """Record the state of a UAV."""
@@ -211,7 +211,7 @@ class LiveView(Node):
             return  # the allocator reports it
         if msg.uav_id not in self.state.lists:
             self.subscribe_list(msg.uav_id)
-        line = {'wall': self.now(), **message_records.state_record(msg)}
+        line = self.line(message_records.state_record(msg))
         last = self.state.uavs.get(msg.uav_id)
         if last is None or line['wall'] - last['wall'] >= _PERIOD * self.state.stretch or any(
                 line[key] != last[key] for key in _STATE_FIELDS):
@@ -232,6 +232,11 @@ class LiveView(Node):
         if len(self.logged_refusals) < _MOST_REFUSALS and refusal not in self.logged_refusals:
             self.logged_refusals.add(refusal)
             self.get_logger().warning(f'{topic}: {reason}: ignored; logged once')
+
+    def line(self, body: RecordBody) -> RecordBody:
+        """The line of a message that arrives now, with all its times in that of the record."""
+        wall = self.now()
+        return {'wall': wall, **message_records.shifted(body, self.time.offset)}
 
     def apply(self, line: RecordBody) -> None:
         """Apply a line to the state of the run, and write it to the record."""
@@ -274,7 +279,7 @@ class LiveView(Node):
         if self.server:
             self.snapshots.put(wall, {'start': self.state.start(), 'live': True,
                                       'speedup': self.state.speedup, 'rate': self.state.rate,
-                                      'ended': ended}, *updates)
+                                      'ended': ended, 'still': self.watch.still}, *updates)
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""

@@ -99,7 +99,8 @@ class MavlinkBridge(Node):
         self.heartbeat = Heartbeat(self.connections.send_to_all)
         self.receiver = threading.Thread(target=self.receive, name='receive', daemon=True)
         self.report = BridgeDiagnostics(
-            self.ground_station, self.connections, self.heartbeat, self.log)
+            self.get_fully_qualified_name(), self.ground_station, self.connections,
+            self.heartbeat, self.log)
 
     def _create_topics(self) -> None:
         self.published = PublishedStates()

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from uav_task_alloc.record.message_records import RecordBody, finite_or_none
+from uav_task_alloc.record.message_records import RecordBody, finite_or_none, from_stamp
 
 _Message = Any
 
@@ -44,16 +44,21 @@ def uploads_record(msg: _Message) -> RecordBody:
         hardware id, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
         UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator; `waiting`: where
         idle UAVs wait, likewise; `orders`: of
-        operators, texts by id, likewise; `battery_reserves`: shares by its name.
+        operators, texts by id, likewise; `battery_reserves`: shares by its name; `stamp`
+        [ROS s] of the message of an allocator.
     """
-    return {'kind': 'uploads', 'uploads': dict(_upload_counts(msg)), 'authority': dict(
-        _authority(msg)), 'clock_rates': dict(_clock_rates(msg)), 'uav_warnings': dict(
-        _of_allocators(msg, UAV_WARNING)), 'waiting': dict(
-        _of_allocators(msg, WAITING)), 'orders': dict(
-        _of_allocators(msg, ORDER)), 'battery_reserves': dict(_battery_reserves(msg)), 'health': {
-        status.hardware_id or status.name: [
-            status.level if isinstance(status.level, int) else ord(status.level), status.message]
-        for status in msg.status}}
+    warnings = dict(_of_allocators(msg, UAV_WARNING))
+    stamp = {'stamp': from_stamp(msg.header.stamp)} if warnings else {}
+    return {
+        'kind': 'uploads', **stamp, 'uploads': dict(_upload_counts(msg)),
+        'authority': dict(_authority(msg)), 'clock_rates': dict(_clock_rates(msg)),
+        'uav_warnings': warnings, 'waiting': dict(_of_allocators(msg, WAITING)),
+        'orders': dict(_of_allocators(msg, ORDER)),
+        'battery_reserves': dict(_battery_reserves(msg)), 'health': {
+            status.hardware_id or status.name: [
+                status.level if isinstance(status.level, int) else ord(status.level),
+                status.message]
+            for status in msg.status}}
 
 
 def _upload_counts(msg: _Message) -> Iterable[tuple[str, int]]:

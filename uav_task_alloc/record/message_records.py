@@ -30,6 +30,7 @@ FENCES = (*MISSIONS, 'OFF', 'UNSUPPORTED', 'REFUSED')
 AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
 SEPARATION_ACTIONS = ('NONE', 'HOLD', 'RELEASE', 'UNRESOLVED')
 _FRAME_LOCAL, WGS84 = 0, 1  # of a Task message
+_ROS_TIMES = ('stamp', 'deadline', 'earliest', 'latest', 'expected')  # of lines and their rows
 _TERRAIN = 1  # `vertical` of a Task message
 
 
@@ -283,6 +284,23 @@ def state_record(msg: _Message) -> RecordBody:
             'authority': constant_name(AUTHORITIES, getattr(msg, 'authority', 0)),
             'reason': getattr(msg, 'reason', ''),
             'fence': constant_name(FENCES, getattr(msg, 'fence_state', 0))}
+
+
+def shifted(body: RecordBody, offset: float) -> RecordBody:
+    """Return a line whose times of the ROS clock are moved to the time of its record.
+
+    Args:
+        body: without its wall time.
+        offset: [s] that is added.
+
+    Returns:
+        A copy, with other `stamp`, `deadline`, windows and expected starts where it has them.
+    """
+    def moved(row: RecordBody) -> RecordBody:
+        return {**row, **{name: row[name] + offset for name in _ROS_TIMES if row.get(name)}}
+
+    return {**moved(body), **{name: [moved(row) for row in body[name]]
+                              for name in ('tasks', 'statuses') if name in body}}
 
 
 def finite_or_none(value: float) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
@@ -29,6 +30,8 @@ from uav_task_alloc.zone_codec import decode_zone
 # share by which a measured clock rate varies, and that of a real vehicle over a bad link
 _RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
 _MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
+_DELAYS = 10  # newest messages of allocators, of which the fastest compares the clocks
+_ALLOCATOR_SILENT = 10.0  # [s] of real time; it reports each second
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
 
@@ -69,6 +72,10 @@ class RunState:
     health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text by UAV
     uav_warnings: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by UAV
     orders: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by id
+    allocators: dict[str, float] = field(default_factory=dict)  # [unix s] of the last report
+    # [s] from the stamps of reports of allocators to their arrival
+    delays: deque[float] = field(default_factory=lambda: deque(maxlen=_DELAYS))
+    ahead: float = 0.0  # [s] by which the clock of `wall` is ahead of that of the allocator
     proposal: Line | None = None  # the last plan that waited for an operator
     alerts: dict[tuple[str, ...], Line] = field(default_factory=dict)  # in force, by pair
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
@@ -260,7 +267,7 @@ class RunState:
 
     def planned_at(self, line: Line) -> float:
         """When a list was planned [unix s]; on arrival where its stamp is of another clock."""
-        wall, stamp = line['wall'], line.get('stamp', 0.0)
+        wall, stamp = line['wall'], line.get('stamp', 0.0) + self.ahead
         # two nodes read /clock up to a tick apart
         return stamp if -self.stretch <= wall - stamp < _MAX_STAMP_AGE else float(wall)
 
@@ -288,6 +295,9 @@ class RunState:
         self.health.update((uav, (level, text))
                            for uav, (level, text) in line.get('health', {}).items())
         self.uav_warnings.update(line.get('uav_warnings', {}))
+        self.allocators.update(dict.fromkeys(line.get('uav_warnings', {}), line['wall']))
+        if 'stamp' in line:
+            self._compare_clocks(line['wall'] - line['stamp'])
         self.orders.update(line.get('orders', {}))
         self.battery_reserves.update(line.get('battery_reserves', {}))
         self.clock_rates.update(line.get('clock_rates', {}))
@@ -302,6 +312,35 @@ class RunState:
                     and abs(since - old.since) < SINCE_TOLERANCE * self.stretch):
                 since = old.since
             self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
+
+    def _compare_clocks(self, delay: float) -> None:
+        """Set `ahead` by the time [s] that a report took; less than a second is a delay."""
+        if abs(delay) >= _MAX_STAMP_AGE:
+            return  # time of another kind
+        self.delays.append(delay)
+        ahead = min(self.delays)
+        if abs(ahead - self.ahead) > self.stretch:
+            self.ahead = ahead if abs(ahead) > self.stretch else 0.0
+
+    def forget_silent(self, wall: float) -> bool:
+        """Forget orders and warnings of allocators that have ended; whether there were any."""
+        silent = self._silent_allocators(wall)
+        orders = [self.orders.pop(name) for name in silent if name in self.orders]
+        return any([*orders, *(self.uav_warnings.pop(name) for name in silent
+                               if name in self.uav_warnings)])
+
+    def _silent_allocators(self, wall: float) -> set[str]:
+        return {name for name, at in self.allocators.items()
+                if wall - at > _ALLOCATOR_SILENT * self.stretch}
+
+    def waiting_plan(self, wall: float) -> Line | None:
+        """The plan that waits; None after its deadline, or where its allocator has ended."""
+        plan = self.proposal
+        if plan is None or not plan['open'] or (
+                self.allocators and self._silent_allocators(wall) == self.allocators.keys()):
+            return None
+        overdue = wall - plan['deadline'] - self.ahead
+        return None if overdue > _ALLOCATOR_SILENT * self.stretch else plan
 
     def is_low(self, battery: float | None) -> bool:
         """Whether a battery is below the reserve of an allocator.

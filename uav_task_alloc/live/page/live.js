@@ -147,6 +147,10 @@ function stateTexts() {
       + 'old. Trying again…'];
   }
   if (!known) return ['connecting', '', ''];
+  if (clock.still && !clock.ended) {
+    return ['✕ clock stands still', 'bad', `The simulated clock stands still at ${stamp(known)}: `
+      + 'the simulation is paused or has ended. What you see may be old.'];
+  }
   if (past) return ['◷ past', 'past', ''];
   if (!clock.live) return ['■ recording', '', ''];
   return clock.ended ? ['■ run ended', '', ''] : ['● live', 'good', ''];

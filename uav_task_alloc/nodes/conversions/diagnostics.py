@@ -67,17 +67,18 @@ def allocator_row(node_name: str, warnings: Sequence[str], values: Mapping[str, 
                          '; '.join(warnings) or 'running', values)
 
 
-def bridge_row(name: str, level: int, message: str,
+def bridge_row(node_name: str, name: str, level: int, message: str,
                values: Mapping[str, object] | None = None) -> DiagnosticRow:
     """Return a row of the bridge: of a UAV, a link, or a part of the bridge itself.
 
     Args:
+        node_name: fully qualified: `/diagnostics` is of all fleets.
         name: of the UAV, link or part.
         level: DiagnosticLevel.
         message: on one line.
         values: details by key.
 
     Returns:
-        Named `mavlink_bridge: NAME`.
+        Named `NODE: NAME`.
     """
-    return DiagnosticRow(f'mavlink_bridge: {name}', level, message, values or {}, name)
+    return DiagnosticRow(f'{node_name}: {name}', level, message, values or {}, name)

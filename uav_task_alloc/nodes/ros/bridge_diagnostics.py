@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from functools import partial
 
 from uav_task_alloc.mavlink.gcs.ground_station import GroundStation
 from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
@@ -27,14 +28,16 @@ class BridgeDiagnostics:
     """Reads the state of a bridge's parts; troubles that begin or end are logged as well.
 
     Args:
+        node_name: fully qualified.
         ground_station: its vehicles and refusals.
         connections: their links and refusals.
         heartbeat: the thread that sends it.
         log: of the node.
     """
 
-    def __init__(self, ground_station: GroundStation, connections: Connections,
+    def __init__(self, node_name: str, ground_station: GroundStation, connections: Connections,
                  heartbeat: Heartbeat, log: LeveledLog) -> None:
+        self._row = partial(bridge_row, node_name)
         self._ground_station, self._connections = ground_station, connections
         self._heartbeat, self._log = heartbeat, log
         self._refusals = (ground_station.refusals, connections.refusals)
@@ -78,7 +81,7 @@ class BridgeDiagnostics:
         """
         rows = [(session.uav_id, diagnostics_of(session, now))
                  for session in self._ground_station.sessions.values()]
-        return [bridge_row(uav_id, each.level, each.summary, asdict(each.facts))
+        return [self._row(uav_id, each.level, each.summary, asdict(each.facts))
                 for uav_id, each in rows]
 
     def part_rows(self, conflict: str) -> Iterator[DiagnosticRow]:
@@ -90,28 +93,28 @@ class BridgeDiagnostics:
         refusal = conflict and f'refuses to fly new lists: {conflict}'
         self._log.report_trouble('fleet_origin', refusal)
         if refusal:
-            yield bridge_row('fleet_origin', _ERROR, refusal)
+            yield self._row('fleet_origin', _ERROR, refusal)
         for link in self._connections.links:
             self._log.report_trouble(link.name, link.trouble)
-            yield bridge_row(link.name, _ERROR if link.trouble else _OK, link.trouble or 'open')
+            yield self._row(link.name, _ERROR if link.trouble else _OK, link.trouble or 'open')
         if self._connections.signing is not None:
             trouble = self._connections.signing.trouble
             self._log.report_trouble('signing', trouble, 'warning')
-            yield bridge_row('signing', _WARN if trouble else _OK, trouble or 'timestamp kept')
+            yield self._row('signing', _WARN if trouble else _OK, trouble or 'timestamp kept')
         yield self._heartbeat_row()
         yield self._messages_row()
 
     def _heartbeat_row(self) -> DiagnosticRow:
         beat = self._heartbeat
-        return bridge_row('heartbeat', _ERROR if beat.trouble else _OK,
-                          beat.trouble or f'{beat.sent} sent',
-                          {'thread_restarts': beat.restarts})
+        return self._row('heartbeat', _ERROR if beat.trouble else _OK,
+                         beat.trouble or f'{beat.sent} sent',
+                         {'thread_restarts': beat.restarts})
 
     def _messages_row(self) -> DiagnosticRow:
         """Counts of refused messages; a warning where there are more than at the last call."""
         count, before = sum(refusals.count for refusals in self._refusals), self._refused
         self._refused = count
-        return bridge_row(
+        return self._row(
             'messages', _WARN if count > before else _OK, f'{count} messages refused', {
                 'messages_refused': count, 'frames_refused': self._connections.errors(),
                 'last_refused': '; '.join(printable(refusals.last) for refusals in self._refusals

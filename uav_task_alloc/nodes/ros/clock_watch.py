@@ -27,7 +27,7 @@ class ClockWatch:
 
     def __init__(self) -> None:
         self._last: tuple[float, float] | None = None  # ROS and steady time of the last change
-        self._still = False  # and it was logged
+        self.still = False  # it has not moved for a while, and that was logged
 
     def update(self, ros: float, steady: float) -> str:
         """Return what is to be logged as a warning; '' where all is well."""
@@ -35,15 +35,15 @@ class ClockWatch:
             self._last = ros, steady
         before, since = self._last
         if ros == before:
-            if self._still or steady - since < _PATIENCE:
+            if self.still or steady - since < _PATIENCE:
                 return ''
-            self._still = True
+            self.still = True
             return ('use_sim_time is true, and nothing publishes /clock: waiting for it'
                     if ros == 0.0 else
                     f'/clock has stood still at {ros:.1f} s for {steady - since:.0f} s: all '
                     'times wait for it')
-        self._last, still = (ros, steady), self._still
-        self._still = False
+        self._last, still = (ros, steady), self.still
+        self.still = False
         if ros < before:
             return f'/clock went back by {before - ros:.1f} s, to {ros:.1f} s'
         if before > 0.0 and ros - before > _STEP + _FASTEST * (steady - since):
