@@ -68,9 +68,10 @@ class Scene:
             self.dirty.add('times')
         elif kind == 'allocation':
             self.new_plans.append(line)
-        clocks = self.run.speedup, self.run.ahead
+        clocks = self.run.speedup, self.run.lead.seconds
         self.run.apply(line)
-        if (self.run.speedup, self.run.ahead) != clocks:  # arrivals and windows are other times
+        # arrivals and windows are other times then
+        if (self.run.speedup, self.run.lead.seconds) != clocks:
             self.dirty |= {'times', *(
                 f'list {uav}' for uav, each in self.run.lists.items() if each['tasks'])}
 
@@ -193,8 +194,8 @@ class Scene:
         plan = self.waiting
         proposal = plan and {
             'revision': plan['revision'], 'trigger': plan['trigger'],
-            'deadline': round(plan['deadline'] + self.run.ahead), 'accepted': plan['accepted'],
-            'changes': plan['changes']}
+            'deadline': round(plan['deadline'] + self.run.lead.seconds),
+            'accepted': plan['accepted'], 'changes': plan['changes']}
         return {'proposal': proposal, 'orders': [
             [name, text] for each in self.run.orders.values() for name, text in each.items()]}
 
@@ -245,7 +246,7 @@ class Scene:
             row = {**_span('planned', run.planned.get(name) if name in flown else None, uav=True),
                    **_span('flown', flown.get(name), uav=True)}
             if task.earliest is not None or task.latest is not None:
-                row['window'] = [each and each + run.ahead
+                row['window'] = [each and each + run.lead.seconds
                                  for each in (task.earliest, task.latest)]
             if row:
                 times[name] = row

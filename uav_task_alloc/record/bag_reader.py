@@ -130,8 +130,11 @@ class BagReader:
             decode = self.decoders.decoder_for(channel.message_encoding, schema)
             if decode is None:
                 raise ValueError(f'{channel.message_encoding}: expected cdr')
+            msg = decode(message.data)
+            if schema.name == _DIAGNOSTICS and self.namespace is not None:
+                msg.status = diagnostic_records.of_namespace(msg, self.namespace)
             body = (self.announcement if schema.name == _ANNOUNCEMENT
-                    else _BUILDERS[schema.name])(decode(message.data))
+                    else _BUILDERS[schema.name])(msg)
         except Exception:  # the decoder raises anything for bytes of another type
             self.undecodable[channel.topic] += 1
             return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
@@ -13,6 +12,12 @@ from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.piece_ids import split_piece
+from uav_task_alloc.record.clock_comparison import (
+    MAX_STAMP_AGE,
+    RATE_TOLERANCE,
+    ClockLead,
+    rounded_rate,
+)
 from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lists
 from uav_task_alloc.record.record_file import RECORD_FILE, Line, read_lines
 from uav_task_alloc.record.reported import (
@@ -27,10 +32,6 @@ from uav_task_alloc.record.reported import (
 from uav_task_alloc.record.ways_home import WaysHome
 from uav_task_alloc.zone_codec import decode_zone
 
-# share by which a measured clock rate varies, and that of a real vehicle over a bad link
-_RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
-_MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
-_DELAYS = 10  # newest messages of allocators, of which the fastest compares the clocks
 _ALLOCATOR_SILENT = 10.0  # [s] of real time; it reports each second
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
@@ -73,9 +74,7 @@ class RunState:
     uav_warnings: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by UAV
     orders: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by id
     allocators: dict[str, float] = field(default_factory=dict)  # [unix s] of the last report
-    # [s] from the stamps of reports of allocators to their arrival
-    delays: deque[float] = field(default_factory=lambda: deque(maxlen=_DELAYS))
-    ahead: float = 0.0  # [s] by which the clock of `wall` is ahead of that of the allocator
+    lead: ClockLead = field(default_factory=ClockLead)  # by the reports of allocators
     proposal: Line | None = None  # the last plan that waited for an operator
     alerts: dict[tuple[str, ...], Line] = field(default_factory=dict)  # in force, by pair
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
@@ -137,7 +136,7 @@ class RunState:
     def _announced_at(self, line: Line) -> float:
         """When tasks were announced [unix s]: by the stamp, where that is before the record."""
         wall, stamp = line['wall'], line.get('stamp', line['wall'])
-        is_earlier = self.silent_after < wall - stamp < _MAX_STAMP_AGE
+        is_earlier = self.silent_after < wall - stamp < MAX_STAMP_AGE
         return float(stamp if is_earlier and self._in_opening(line) else wall)
 
     def _in_opening(self, line: Line) -> bool:
@@ -267,9 +266,9 @@ class RunState:
 
     def planned_at(self, line: Line) -> float:
         """When a list was planned [unix s]; on arrival where its stamp is of another clock."""
-        wall, stamp = line['wall'], line.get('stamp', 0.0) + self.ahead
+        wall, stamp = line['wall'], line.get('stamp', 0.0) + self.lead.seconds
         # two nodes read /clock up to a tick apart
-        return stamp if -self.stretch <= wall - stamp < _MAX_STAMP_AGE else float(wall)
+        return stamp if -self.stretch <= wall - stamp < MAX_STAMP_AGE else float(wall)
 
     def finish(self, uav: str) -> float | None:
         """When the last task of a UAV's list ends [unix s]; None: it has none."""
@@ -297,13 +296,13 @@ class RunState:
         self.uav_warnings.update(line.get('uav_warnings', {}))
         self.allocators.update(dict.fromkeys(line.get('uav_warnings', {}), line['wall']))
         if 'stamp' in line:
-            self._compare_clocks(line['wall'] - line['stamp'])
+            self.lead.add(line['wall'] - line['stamp'], self.stretch)
         self.orders.update(line.get('orders', {}))
         self.battery_reserves.update(line.get('battery_reserves', {}))
         self.clock_rates.update(line.get('clock_rates', {}))
         if self.measured and self.clock_rates:
             rate = median(self.clock_rates.values())
-            if abs(rate - self.rate) > _RATE_TOLERANCE * self.rate:
+            if abs(rate - self.rate) > RATE_TOLERANCE * self.rate:
                 self._set_rate(rounded_rate(rate))
         for uav, row in line.get('authority', {}).items():
             since = None if row['for'] is None else line['wall'] - self.stretch * row['for']
@@ -312,15 +311,6 @@ class RunState:
                     and abs(since - old.since) < SINCE_TOLERANCE * self.stretch):
                 since = old.since
             self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
-
-    def _compare_clocks(self, delay: float) -> None:
-        """Set `ahead` by the time [s] that a report took; less than a second is a delay."""
-        if abs(delay) >= _MAX_STAMP_AGE:
-            return  # time of another kind
-        self.delays.append(delay)
-        ahead = min(self.delays)
-        if abs(ahead - self.ahead) > self.stretch:
-            self.ahead = ahead if abs(ahead) > self.stretch else 0.0
 
     def forget_silent(self, wall: float) -> bool:
         """Forget orders and warnings of allocators that have ended; whether there were any."""
@@ -339,7 +329,7 @@ class RunState:
         if plan is None or not plan['open'] or (
                 self.allocators and self._silent_allocators(wall) == self.allocators.keys()):
             return None
-        overdue = wall - plan['deadline'] - self.ahead
+        overdue = wall - plan['deadline'] - self.lead.seconds
         return None if overdue > _ALLOCATOR_SILENT * self.stretch else plan
 
     def is_low(self, battery: float | None) -> bool:
@@ -387,20 +377,6 @@ class RunState:
     def zones_now(self) -> list[ThreatZone]:
         """The zones in force after the last line."""
         return [interval.zone for interval in self.zones if interval.until == math.inf]
-
-
-def rounded_rate(rate: float) -> float:
-    """A measured clock rate; the whole number near it where there is one, as that was chosen.
-
-    Args:
-        rate: seconds of the vehicles in a second of wall time, with the jitter of their links.
-
-    Returns:
-        1.0 also for 10 % more or less.
-    """
-    whole = max(1.0, float(round(rate)))
-    tolerance = _REAL_TIME_TOLERANCE if whole == 1.0 else _RATE_TOLERANCE * whole
-    return whole if abs(rate - whole) <= tolerance else round(rate, 2)
 
 
 def read_record(out_dir: Path) -> RunState:
