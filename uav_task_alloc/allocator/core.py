@@ -150,12 +150,13 @@ class Allocator:
             newest = max((each.stamp for each in world.lists.lists.values()), default=stamp)
             last = max(newest, stamp), now
         before, since = last
-        began = before <= 0.0 < stamp
-        if stamp > 0.0 and (began or since == now):
+        latest = before + _CLOCK_STEP + _FASTEST * (now - since)
+        jumped = not before - _CLOCK_STEP <= stamp <= latest
+        began = before <= 0.0 < stamp and jumped
+        if began or (since == now and stamp > _CLOCK_STEP):
             world.tasks.clock_began(stamp)
             world.announced.seen.clock_began(stamp)
-        latest = before + _CLOCK_STEP + _FASTEST * (now - since)
-        if not began and before - _CLOCK_STEP <= stamp <= latest:
+        if not jumped:
             return
         for part in (world.flights, world.lists, self.approvals, self.separation):
             part.clock_jumped(stamp - before)

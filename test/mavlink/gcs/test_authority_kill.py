@@ -245,3 +245,22 @@ def test_in_flight_a_file_that_cannot_be_used_is_as_none(kind):
     bench.assign(task_list('ABCDE'))
     assert bench.reaches(AuthorityState.HELD, 20.0)
     assert bench.run(lambda: bench.completed()[-1:] == ['E'], 200.0)
+
+
+@BOTH
+def test_a_killed_vehicle_is_handed_over_only_at_rest(kind):
+    bench = AuthorityBench(kind).discover()
+    bench.assign(task_list('A', 1))
+    flight = bench.vehicles[1].flight
+    assert bench.run(lambda: flight.body.position[2] > 25.0, 60.0)
+    bench.vehicles[1].rc_arm(False, force=True)
+    assert bench.reaches(L, 3.0)
+    answers = []
+    while flight.body.position[2] > 1.0:
+        answers.append(bench.hand_over())
+        bench.run(limit=0.1)
+    assert answers
+    assert set(answers) == {'after a kill only at rest: it has not been for 2 s'}
+    bench.run(limit=4.0)
+    assert bench.hand_over() == ''
+    assert bench.authority() is H

@@ -15,6 +15,7 @@ from uav_task_alloc.mavlink.gcs.policy import Policy
 
 REST_SPEED = 1.0  # [m/s] below which a vehicle is at rest
 _REST_DISTANCE, _REST_TIME = 3.0, 6.0  # [m], [s]: at rest, for a hand-over
+_LIES_TIME = 2.0  # [s] at rest, of a killed one; a fall is faster than REST_SPEED at once
 _LOW_BATTERY = 0.2  # [0..1] below which a hand-over is refused
 
 
@@ -30,6 +31,8 @@ class HandOver:
     def __init__(self, state: AuthorityWatchState, evidence: MissionEvidence,
                  policy: Callable[[], Policy]) -> None:
         self._state, self._evidence, self._policy = state, evidence, policy
+        # since when [s], and at which height [m], a killed vehicle has not moved
+        self._lies: tuple[float, float] | None = None
 
     def request(self, operator: str, now: float) -> str:
         """Hand over a vehicle that is not HELD; returns the refusal, '' on success."""
@@ -63,6 +66,9 @@ class HandOver:
             return 'not known whether it is in the air'
         if authority.killed and (state.armed or not telemetry.grounded):
             return 'after a kill only on the ground and disarmed'
+        # one that is disarmed says that it is on the ground while it falls
+        if authority.killed and not (self._lies and now - self._lies[0] >= _LIES_TIME):
+            return f'after a kill only at rest: it has not been for {_LIES_TIME:g} s'
         if state.status >= d.MAV_STATE_CRITICAL:
             return 'a failsafe is active'
         if telemetry.grounded and not self._policy().takeoff:
@@ -72,6 +78,7 @@ class HandOver:
     def step(self, now: float) -> None:
         """Apply the hand-over by STICK -> HOLD once the vehicle has been at rest long enough."""
         state, telemetry = self._state, self._state.telemetry
+        self._watch_killed(now)
         if state.rest is None:
             return
         since, position = state.rest
@@ -85,3 +92,15 @@ class HandOver:
             state.rest = None
             state.apply(AuthorityEvent.STICK_TO_HOLD, now,
                         f'{state.name_of(state.mode)} at rest for {_REST_TIME:g} s')
+
+    def _watch_killed(self, now: float) -> None:
+        """Note since when a killed vehicle has been at rest."""
+        telemetry = self._state.telemetry
+        at_rest = (self._state.authority.killed and not self._state.armed
+                   and telemetry.speed < REST_SPEED
+                   and now - telemetry.position_at < _LIES_TIME)
+        height = telemetry.position[2]
+        if not at_rest:
+            self._lies = None
+        elif self._lies is None or abs(height - self._lies[1]) > REST_SPEED:
+            self._lies = now, height
