@@ -3,6 +3,7 @@
 import math
 import random
 import statistics
+from dataclasses import replace
 
 import pytest
 
@@ -100,6 +101,17 @@ def test_a_deadline_is_kept():
     result = plan(uavs, tasks, budget=0.05, separation=RULE)
     assert result.timetable().late == {}
     assert result.arrivals['ta'] <= 41.0
+
+
+def test_a_uav_in_the_air_that_waits_for_a_release_passes_others_when_it_does():
+    uavs, tasks = crossing()
+    free = replace(tasks[1], release=60.0)  # when the other has passed
+    result = plan(uavs, [tasks[0], free], budget=0.02, separation=RULE)
+    assert result.conflicts == ()
+    uavs[0] = replace(uavs[0], position=(-400.0, 200.0, 30.0))
+    result = plan(uavs, [tasks[0], free], budget=0.02, separation=RULE)
+    assert result.arrivals['tb'] == pytest.approx(100.0, abs=0.5)
+    assert [each.resolution for each in result.conflicts] == ['height']
 
 
 def scene(seed, uavs, tasks, bases):

@@ -200,15 +200,17 @@ def leg_times(flight: Flight, leg: FlightLeg, ready: float, first: bool = False)
         flight: with its speeds.
         leg: to be flown.
         ready: [s] when the service before is over.
-        first: it is the first leg; in the air that waits at its end, unless the flight `waits`.
+        first: it is the first leg; in the air that waits for its release only, and for
+            `earliest` at its end, unless the flight `waits`.
 
     Returns:
         Its times.
     """
     seconds = flight.leg_seconds(leg, first)
     if first and flight.in_air and not flight.waits:
-        arrival = ready + seconds
-        return LegTimes(ready, ready, arrival, max(arrival, leg.earliest) + leg.service)
+        begin = max(ready, leg.release)
+        arrival = begin + seconds
+        return LegTimes(ready, begin, arrival, max(arrival, leg.earliest) + leg.service)
     if leg.takes_off and flight.pace is not None:
         ready += flight.pace.takeoff
     begin = max(ready, leg.release, leg.hold_until, leg.earliest - seconds)

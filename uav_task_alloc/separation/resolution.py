@@ -243,7 +243,7 @@ def _climbed_rows(flight: Flight, rows: Sequence[PieceRow]) -> int:
     leg = flight.legs[0]
     if not flight.in_air or leg.top <= leg.points[0][2]:
         return 0
-    end = rows[0][0] + flight.parts(leg, True)[0][0] if rows else 0.0
+    end = max(rows[0][0], leg.release) + flight.parts(leg, True)[0][0] if rows else 0.0
     return sum(row[1] <= end + 1e-6 for row in rows)
 
 

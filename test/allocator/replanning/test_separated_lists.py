@@ -194,6 +194,17 @@ def test_the_leg_under_way_keeps_its_heights_though_the_straight_one_is_shorter(
     assert dropped.stops[0].leg.via == ()
 
 
+def test_a_uav_that_hovers_up_to_a_release_is_planned_to_set_out_then():
+    driver = AllocatorDriver(**ON)
+    driver.uav('u', 0.0, 0.0, 50.0, **SPEEDS)
+    driver.add(Task('t', (300.0, 0.0, 50.0), release=driver.now + 40.0))
+    driver.settle()
+    world = driver.world
+    flight = planned_flights(world, world.lists_in_force(), driver.now)['u']
+    times = leg_times(flight, flight.legs[0], 0.0, True)
+    assert times.begin == flight.legs[0].release > 30.0
+
+
 def waits_at_the_stop_before():
     """`a` waits at its first task up to 100 s for a second one, as of a plan long ago."""
     driver = AllocatorDriver(**ON)
