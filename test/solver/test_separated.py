@@ -114,6 +114,25 @@ def test_a_uav_in_the_air_that_waits_for_a_release_passes_others_when_it_does():
     assert [each.resolution for each in result.conflicts] == ['height']
 
 
+def test_a_uav_in_the_air_is_in_the_way_also_before_it_is_available():
+    uavs, tasks = crossing()
+    uavs[1] = replace(uavs[1], position=(200.0, 200.0, 30.0), available_from=60.0)
+    result = plan(uavs, tasks, budget=0.02, separation=RULE)
+    assert [each.resolution for each in result.conflicts] == ['height']
+    assert result.arrivals['tb'] == 80.0
+
+
+@pytest.mark.parametrize(('start', 'meets'), [(-300.0, True), (-500.0, False)])
+def test_the_stay_of_a_task_with_a_path_is_at_its_end_as_missions_hold_there(start, meets):
+    uavs = [Uav('a', (start, 200.0, 30.0), home=(start, 0.0, 0.0), cruise_speed=10.0),
+            Uav('b', (0.0, -100.0, 30.0), home=(0.0, -300.0, 0.0), cruise_speed=10.0)]
+    tasks = [Task('ta', (600.0, 200.0, 30.0), allowed_uavs={'a'}),
+             Task('tb', (0.0, -90.0, 30.0), path=((0.0, -90.0, 30.0), (0.0, 300.0, 30.0)),
+                  service_time=20.0, allowed_uavs={'b'})]
+    result = plan(uavs, tasks, budget=0.02, separation=Separation(10.0, 5.0, 0.0, 0.0))
+    assert bool(result.conflicts) == meets
+
+
 def scene(seed, uavs, tasks, bases):
     rng = random.Random(seed)
     size = 100.0 * math.sqrt(tasks)

@@ -108,7 +108,7 @@ class _Planner:
         for n, rows in enumerate(rows_of_legs(flight, self._rule)):
             if not whole and n < len(flight.legs) and flight.legs[n].movable:
                 if n == 0:
-                    self._accepted.add(rows[:_climbed_rows(flight, rows)], (k, n))
+                    self._accepted.add(rows[:_kept_rows(flight, rows)], (k, n))
                 return
             self._accepted.add(rows, (k, n))  # also where one without legs stays
 
@@ -219,8 +219,8 @@ class _Planner:
                   whole: bool = True) -> bool:
         """Whether a leg is apart, and the return or path after it that cannot wait (`whole`)."""
         rows = leg_rows(flight, leg, times, self._rule, n == 0)
-        if n == 0:  # no change of the leg changes the climb
-            rows = rows[_climbed_rows(replace(flight, legs=(leg,)), rows):]
+        if n == 0:
+            rows = rows[_kept_rows(replace(flight, legs=(leg,)), rows):]
         if n + 1 == len(flight.legs):
             rows += self._stay(flight, times.end)
         if self._accepted.conflict(rows, k) is not None:
@@ -238,12 +238,17 @@ class _Planner:
         return other_heights(flight, leg, self._rule, self._limits)
 
 
-def _climbed_rows(flight: Flight, rows: Sequence[PieceRow]) -> int:
-    """Number of pieces of the first leg that are the rest of a take-off that has begun."""
+def _kept_rows(flight: Flight, rows: Sequence[PieceRow]) -> int:
+    """Number of pieces of the first leg that no change of it changes.
+
+    In the air they are the hover before its release, and the rest of a take-off that has begun.
+    """
     leg = flight.legs[0]
-    if not flight.in_air or leg.top <= leg.points[0][2]:
+    if not flight.in_air or not rows:
         return 0
-    end = max(rows[0][0], leg.release) + flight.parts(leg, True)[0][0] if rows else 0.0
+    end = rows[0][0] if flight.waits else max(rows[0][0], leg.release)
+    if leg.top > leg.points[0][2]:
+        end += flight.parts(leg, True)[0][0]
     return sum(row[1] <= end + 1e-6 for row in rows)
 
 

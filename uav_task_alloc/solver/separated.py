@@ -133,11 +133,11 @@ def _flight(uav: Uav, plan: Plan, times: Timetable, tasks: Mapping[str, Task],
         for k, name in enumerate(row):
             task, leg = tasks[name], next(rows)
             release = task.release
-            if on_ground and k == 0 and number < len(departures):
+            if k == 0 and number < len(departures):
                 release = max(release, departures[number])
-            legs.append(FlightLeg((place, *leg.via, task.position), name, task.stay,
-                                  task.earliest, task.latest, release,
-                                  takes_off=on_ground and k == 0))
+            legs.append(FlightLeg((place, *leg.via, task.position), name,
+                                  0.0 if task.path else task.stay, task.earliest, task.latest,
+                                  release, takes_off=on_ground and k == 0))
             if task.path:
                 legs.append(_along_path(uav, task))
             place = task.end
@@ -147,13 +147,14 @@ def _flight(uav: Uav, plan: Plan, times: Timetable, tasks: Mapping[str, Task],
                                   uav.turnaround if number + 1 < len(trips) else 0.0, lands=True))
             place = uav.base
     return Flight(uav.id, tuple(legs), uav.position, uav.cruise_speed, uav.climb_speed,
-                  uav.descent_speed, uav.available_from, in_air=not uav.at_base)
+                  uav.descent_speed, uav.available_from if uav.at_base else 0.0,
+                  in_air=not uav.at_base)
 
 
 def _along_path(uav: Uav, task: Task) -> FlightLeg:
-    """The path of a task; where it is flown slower than other legs it takes longer at its end."""
-    slower = service_seconds(uav, task) - task.stay - flight_time(uav, task.path)
-    return FlightLeg(task.path, '', max(0.0, slower), movable=False, may_wait=False)
+    """The path of a task; the stay, and what it takes longer than other legs, are at its end."""
+    stay = service_seconds(uav, task) - flight_time(uav, task.path)
+    return FlightLeg(task.path, '', max(0.0, stay), movable=False, may_wait=False)
 
 
 def _is_path(leg: FlightLeg) -> bool:
