@@ -9,7 +9,9 @@ import pytest
 
 from uav_task_alloc import Separation, Task, ThreatZone, Uav, plan
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.flight_time import flight_time
 from uav_task_alloc.geometry.zones import path_is_clear
+from uav_task_alloc.objective import OBJECTIVES
 from uav_task_alloc.separation.conflicts import find_conflicts
 from uav_task_alloc.separation.volumes import flight_volumes
 from uav_task_alloc.solver.separated import flights_of_plan
@@ -131,6 +133,84 @@ def test_the_stay_of_a_task_with_a_path_is_at_its_end_as_missions_hold_there(sta
                   service_time=20.0, allowed_uavs={'b'})]
     result = plan(uavs, tasks, budget=0.02, separation=Separation(10.0, 5.0, 0.0, 0.0))
     assert bool(result.conflicts) == meets
+
+
+ONE_HEIGHT = {'altitude_min': 30.0, 'altitude_max': 30.0}
+
+
+@pytest.mark.parametrize(('limit', 'heights', 'resolution'), [
+    ({'available_until': 39.0}, ONE_HEIGHT, 'left out'),  # a wait would end after it
+    ({'available_until': 44.0}, ONE_HEIGHT, 'hold'),
+    ({'range': 386.0}, {}, 'hold'),  # another height is longer
+    ({'range': 500.0}, {}, 'height')])
+def test_heights_and_waits_keep_ranges_and_availability(limit, heights, resolution):
+    uavs = [Uav('a', (-100.0, 0.0, 30.0), home=(-100.0, 0.0, 0.0), cruise_speed=10.0),
+            Uav('b', (0.0, -100.0, 0.0), cruise_speed=10.0, **limit)]
+    tasks = [Task('ta', (200.0, 0.0, 30.0), allowed_uavs={'a'}),
+             Task('tb', (0.0, 90.0, 30.0), allowed_uavs={'b'})]
+    result = plan(uavs, tasks, budget=0.02, route_end='home', objective='finish',
+                  separation=Separation(10.0, 5.0, 2.0, 0.0), **heights)
+    assert [each.resolution for each in result.conflicts] == [resolution]
+    assert result.penalty == 0.0
+    ends = result.timetable().ends
+    assert ends.get('b', 0.0) <= limit.get('available_until', math.inf)
+
+
+def locked_to_wait(x, **limits):
+    """`b` flies from its first task to its second one across the way of `a`, at one height."""
+    uavs = [Uav('a', (x, 0.0, 30.0), home=(-100.0, 0.0, 0.0), cruise_speed=10.0),
+            Uav('b', (0.0, -100.0, 30.0), home=(-300.0, 90.0, 0.0), cruise_speed=10.0, **limits)]
+    tasks = [Task('ta', (300.0, 0.0, 30.0), allowed_uavs={'a'}),
+             Task('t0', (0.0, -90.0, 30.0), allowed_uavs={'b'}),
+             Task('tb', (0.0, 90.0, 30.0), allowed_uavs={'b'})]
+    return plan(uavs, tasks, budget=0.02, route_end='home', locked={'b': ('t0', 'tb')},
+                separation=Separation(20.0, 5.0, 2.0), **ONE_HEIGHT)
+
+
+def test_a_uav_in_the_air_does_not_wait_beyond_its_endurance():
+    free, bound = locked_to_wait(-100.0), locked_to_wait(-100.0, endurance=50.0)
+    assert [each.resolution for each in free.conflicts] == ['hold']
+    assert free.finish > 50.0
+    assert [each.resolution for each in bound.conflicts] == ['left out']
+    assert bound.timetable().ends['b'] == pytest.approx(49.0)
+
+
+def test_a_deadline_that_the_plan_keeps_is_kept_also_where_the_climb_is_a_column():
+    uavs = [Uav('a', (-100.0, 50.0, 30.0), home=(-100.0, 0.0, 0.0), cruise_speed=10.0),
+            Uav('b', (0.0, 0.0, 0.0), cruise_speed=10.0, climb_speed=2.5, descent_speed=2.5)]
+    tasks = [Task('ta', (300.0, 50.0, 30.0), allowed_uavs={'a'}),
+             Task('tb', (0.0, 100.0, 30.0), allowed_uavs={'b'}, latest=15.0)]
+    result = plan(uavs, tasks, budget=0.02, separation=Separation(20.0, 5.0, 2.0), **ONE_HEIGHT)
+    assert result.conflicts
+    assert result.timetable().late == {}
+
+
+def test_times_of_a_changed_plan_are_those_of_its_legs():
+    uavs = [Uav('a', (150.0, -150.0, 30.0), home=(0.0, 0.0, 0.0), cruise_speed=10.0),
+            Uav('b', (0.0, 0.0, 30.0), home=(300.0, 0.0, 0.0), cruise_speed=10.0,
+                climb_speed=2.5, descent_speed=1.0)]
+    tasks = [Task('ta', (150.0, 150.0, 30.0), allowed_uavs={'a'}),
+             Task('tb', (0.0, 10.0, 30.0), allowed_uavs={'b'})]
+    result = plan(uavs, tasks, budget=0.02, route_end='home', separation=Separation(20., 5., 2.))
+    leg = result.legs['b'][-1]
+    assert leg.via
+    assert result.timetable().ends['b'] == pytest.approx(result.timetable().starts['tb'] + (
+        flight_time(uavs[1], (tasks[1].position, *leg.via, uavs[1].base))))
+
+
+def test_the_penalty_of_a_changed_plan_is_that_of_each_trip():
+    uavs = [Uav('a', (0.0, 0.0, 0.0), range=500.0, turnaround=30.0, cruise_speed=10.0,
+                climb_speed=5.0, descent_speed=5.0),
+            Uav('b', (-100.0, 100.0, 30.0), home=(-100.0, 200.0, 0.0), cruise_speed=10.0)]
+    tasks = [Task('t1', (0.0, 200.0, 30.0), allowed_uavs={'a'}),
+             Task('t2', (0.0, -200.0, 30.0), allowed_uavs={'a'}),
+             Task('t3', (200.0, 100.0, 30.0), allowed_uavs={'b'})]
+    result = plan(uavs, tasks, budget=0.02, trips=2, route_end='home', objective='finish',
+                  locked={'a': ('t1',)}, separation=Separation(20.0, 5.0, 2.0))
+    assert len(result.trips['a']) == 2
+    assert result.conflicts
+    assert result.penalty == 0.0
+    assert result.cost == pytest.approx(OBJECTIVES['finish'].cost(result.distance, result.finish))
 
 
 def scene(seed, uavs, tasks, bases):

@@ -28,6 +28,7 @@ class TransitLimits:
         stop: polled before each change that is tried; True ends the search for changes.
         max_price: [s] of flight that the change of a return that cannot wait may cost; changes
             that cost more are left to the flight, where less is uncertain.
+        is_allowed: whether a UAV may fly so: limits of it that the separation does not know.
     """
 
     altitude_min: float = -math.inf  # [m]
@@ -35,6 +36,7 @@ class TransitLimits:
     is_clear: Callable[[Sequence[Point]], bool] = lambda points: True
     stop: Callable[[], bool] = lambda: False
     max_price: float = math.inf  # [s]
+    is_allowed: Callable[[Flight], bool] = lambda flight: True
 
 
 @dataclass(frozen=True, slots=True)

@@ -123,7 +123,7 @@ class _Planner:
                 if change is not None and change.kind:
                     self.changes[k, n] = change
                     leg = change.leg
-                    flight = replace(flight, legs=(*flight.legs[:n], leg, *flight.legs[n + 1:]))
+                    flight = _with_leg(flight, n, leg)
             times = leg_times(flight, leg, ready, n == 0)
             if not fixed:
                 self._accepted.add(leg_rows(flight, leg, times, self._rule, n == 0), (k, n))
@@ -181,7 +181,8 @@ class _Planner:
             option = with_wait(paths[number], planned.begin, wait)
             times = leg_times(flight, option.leg, ready, n == 0)
             if option.kind and self._is_apart(flight, k, n, option.leg, times, whole) and (
-                    keeps_deadlines(flight, n, times.end - planned.end, planned.end)):
+                    keeps_deadlines(flight, n, times.end - planned.end, planned.end)) and (
+                    self._limits.is_allowed(_with_leg(flight, n, option.leg))):
                 return option
         return None
 
@@ -211,7 +212,8 @@ class _Planner:
         saved = [each for each in self._heights(flight, leg) if each.seconds < -_LEAST_SAVED]
         for change in sorted(saved, key=lambda each: each.seconds):
             times = leg_times(flight, change.leg, ready, n == 0)
-            if self._is_apart(flight, k, n, change.leg, times):
+            if self._is_apart(flight, k, n, change.leg, times) and (
+                    self._limits.is_allowed(_with_leg(flight, n, change.leg))):
                 return replace(change, seconds=0.0)
         return None
 
@@ -236,6 +238,11 @@ class _Planner:
     def _heights(self, flight: Flight, leg: FlightLeg) -> Iterator[LegChange]:
         """The leg at other transit heights that it may have."""
         return other_heights(flight, leg, self._rule, self._limits)
+
+
+def _with_leg(flight: Flight, n: int, leg: FlightLeg) -> Flight:
+    """A flight with another n-th leg."""
+    return replace(flight, legs=(*flight.legs[:n], leg, *flight.legs[n + 1:]))
 
 
 def _kept_rows(flight: Flight, rows: Sequence[PieceRow]) -> int:

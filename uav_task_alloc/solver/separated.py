@@ -6,23 +6,22 @@ not serve the task, and is left out in the end.
 """
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from uav_task_alloc.geometry.flight_time import flight_time, service_seconds
-from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.geometry.zones import path_is_clear
-from uav_task_alloc.model import Leg, Plan, Task, Uav, turned_tasks
-from uav_task_alloc.objective import Objective, excess, fit, response_time
+from uav_task_alloc.model import Plan, Task, Uav, turned_tasks
+from uav_task_alloc.objective import fit
 from uav_task_alloc.separation.conflicts import load_separation_kernels
-from uav_task_alloc.separation.flight_legs import Flight, FlightLeg, LegTimes, leg_times
+from uav_task_alloc.separation.flight_legs import Flight, FlightLeg
 from uav_task_alloc.separation.leg_changes import TransitLimits
 from uav_task_alloc.separation.resolution import Resolution, resolve
 from uav_task_alloc.separation.rule import Conflict, Separation
 from uav_task_alloc.separation.volumes import flight_volumes, meeting_place
 from uav_task_alloc.solver.problem import Limits, Rules
+from uav_task_alloc.solver.timed.separated_trips import SeparatedTrips
 from uav_task_alloc.solver.warm import WarmState
 from uav_task_alloc.timetable import Timetable
 
@@ -64,7 +63,9 @@ def separated_plan(solve: Solve, uavs: Sequence[Uav], tasks: Sequence[Task],
     fixed = {task.id for held in locked.values() for task in held}
     for turn in range(_ROUNDS + 1):
         flights = flights_of_plan(result, uavs, known, rules.returns)
-        found = resolve(flights, rule, transit, places=True)
+        trips = SeparatedTrips(result, uavs, tasks, locked, rules)
+        found = resolve(flights, rule, replace(transit, is_allowed=trips.keeps_limits),
+                        places=True)
         barred = _barred(found, fixed, rule)
         if not barred or turn == _ROUNDS or transit.stop():
             break
@@ -77,7 +78,7 @@ def separated_plan(solve: Solve, uavs: Sequence[Uav], tasks: Sequence[Task],
             if turn == _ROUNDS - 1:
                 known[name] = replace(known[name], allowed_uavs=frozenset())
         result = solve(list(known.values()), result, _AGAIN_SHARE * budget)
-    return _with_resolution(result, uavs, tasks, rules, flights, found, moved)
+    return _with_resolution(result, trips, rules, flights, found, moved)
 
 
 def _barred(found: Resolution, fixed: Iterable[str], rule: Separation
@@ -157,33 +158,19 @@ def _along_path(uav: Uav, task: Task) -> FlightLeg:
     return FlightLeg(task.path, '', max(0.0, stay), movable=False, may_wait=False)
 
 
-def _is_path(leg: FlightLeg) -> bool:
-    """Whether a leg is the path of a task, which is no leg of the plan."""
-    return not leg.task and not leg.lands
-
-
-def _with_resolution(plan: Plan, uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
-                     before: Sequence[Flight], found: Resolution,
-                     moved: Mapping[str, Conflict]) -> Plan:
+def _with_resolution(plan: Plan, trips: SeparatedTrips, rules: Rules, before: Sequence[Flight],
+                     found: Resolution, moved: Mapping[str, Conflict]) -> Plan:
     """The plan with changed legs and times, reasons and conflicts."""
     conflicts = (*found.conflicts, *(_moved(plan, name, each) for name, each in moved.items()))
     unassigned = {name: _ALONE.format(*moved[name].uavs) if name in moved else why
                   for name, why in plan.unassigned.items()}
     if not any(a is not b for a, b in zip(before, found.flights, strict=True)):
         return replace(plan, conflicts=conflicts, unassigned=unassigned)
-    legs = {flight.uav: _legs(plan.legs.get(flight.uav, ()), old, flight)
-            for old, flight in zip(before, found.flights, strict=True)}
-    times = _times(plan.timetable(), tasks, before, found.flights)
-    paths = {task.id: task.path_length for task in tasks}
-    lengths = [math.fsum((*(leg.length for leg in legs[uav.id]),
-                          *(paths[name] for name in plan.routes[uav.id]))) for uav in uavs]
-    distance, penalty = math.fsum(lengths), max(plan.penalty, excess(uavs, lengths))
-    old, new = (_cost(rules.objective, metres, each)
-                for metres, each in ((plan.distance, plan.timetable()), (distance, times)))
-    return replace(plan, legs=legs, distance=distance, penalty=penalty,
-                   fit=fit(distance, plan.value, penalty, rules.weights),
-                   cost=plan.cost + new - old, timetable=lambda: times, conflicts=conflicts,
-                   unassigned=unassigned)
+    flown = trips.evaluation(found.flights)
+    return replace(plan, legs={each.uav: trips.legs(each) for each in found.flights},
+                   distance=flown.distance, penalty=flown.penalty, cost=flown.cost,
+                   fit=fit(flown.distance, plan.value, flown.penalty, rules.weights),
+                   timetable=lambda: flown.timetable, conflicts=conflicts, unassigned=unassigned)
 
 
 def _moved(plan: Plan, name: str, each: Conflict) -> Conflict:
@@ -192,50 +179,3 @@ def _moved(plan: Plan, name: str, each: Conflict) -> Conflict:
     if not uav_id:
         return replace(each, resolution='left out', detail=f'task {name} is left out')
     return replace(each, resolution='other uav', detail=f'{uav_id} serves task {name}')
-
-
-def _legs(planned: Sequence[Leg], old: Flight, new: Flight) -> tuple[Leg, ...]:
-    """Legs with the transit heights."""
-    pairs = [(a, b) for a, b in zip(old.legs, new.legs, strict=True) if not _is_path(a)]
-    return tuple(leg if a.points == b.points else Leg(b.points[1:-1], polyline_length(b.points))
-                 for leg, (a, b) in zip(planned, pairs, strict=True))
-
-
-def _cost(objective: Objective, metres: float, times: Timetable) -> float:
-    return objective.cost(metres, max(times.ends.values(), default=0.0), times.response,
-                          math.fsum(times.late.values()))
-
-
-def _all_times(flight: Flight) -> list[LegTimes]:
-    ready, found = flight.begin, list[LegTimes]()
-    for n, leg in enumerate(flight.legs):
-        found.append(leg_times(flight, leg, ready, n == 0))
-        ready = found[-1].end
-    return found
-
-
-def _times(times: Timetable, tasks: Sequence[Task], before: Sequence[Flight],
-           after: Sequence[Flight]) -> Timetable:
-    """The times of a plan, later by what the changes cost."""
-    arrivals, starts, ends = dict(times.arrivals), dict(times.starts), dict(times.ends)
-    departures = dict(times.departures)
-    for old, new in zip(before, after, strict=True):
-        if old is new:
-            continue
-        takes_off = list[float]()
-        for leg, was, now in zip(old.legs, _all_times(old), _all_times(new), strict=True):
-            later = now.end - was.end
-            if leg.takes_off:
-                takes_off.append(now.begin - was.begin)
-            if leg.task:
-                arrivals[leg.task] += now.arrival - was.arrival
-                starts[leg.task] += later  # the path after it begins as much later
-        ends[old.uav] = times.ends.get(old.uav, 0.0) + later
-        if len(takes_off) == len(departures.get(old.uav, ())):
-            departures[old.uav] = tuple(a + b for a, b in zip(departures[old.uav], takes_off,
-                                                              strict=True))
-    latest = {task.id: task.latest for task in tasks}
-    late = {name: start - latest[name] for name, start in starts.items()
-            if start > latest.get(name, math.inf) + 1e-6}
-    return replace(times, arrivals=arrivals, starts=starts, ends=ends, departures=departures,
-                   late=late, response=response_time(tasks, starts))

@@ -16,6 +16,7 @@ from uav_task_alloc.objective import response_time
 from uav_task_alloc.solver.problem import Rules, excess_cost
 from uav_task_alloc.solver.timed.schedule import (
     ROUNDING,
+    GivenWaits,
     Held,
     LegOf,
     Trip,
@@ -43,8 +44,9 @@ class TimedEvaluation:
 
 def evaluate_routes(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
              routes: Mapping[str, Trips], leg: LegOf | None = None,
-             held: Held | None = None, reversed: Collection[str] = ()) -> TimedEvaluation:
-    """Evaluate routes with the best departures.
+             held: Held | None = None, reversed: Collection[str] = (),
+             given: Mapping[str, GivenWaits] | None = None) -> TimedEvaluation:
+    """Evaluate routes with the best departures, or with those that are given.
 
     Args:
         uavs: the fleet.
@@ -54,6 +56,7 @@ def evaluate_routes(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
         leg: lengths and flight times; None: straight legs.
         held: locked tasks, whose windows are no rule, and payloads on board.
         reversed: ids of the tasks with a path that are flown from their last point.
+        given: departures and waits by UAV id; a UAV without has the best departures.
 
     Returns:
         Times, cost and violations.
@@ -68,7 +71,7 @@ def evaluate_routes(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
     violations += _wrong_tasks(known, routes)
     trips = [each for uav in uavs for each in scheduled_trips(
         uav, [[known[name] for name in row if name in known] for row in routes.get(uav.id, ())],
-        rules, leg, held)]
+        rules, leg, held, (given or {}).get(uav.id))]
     holders = _holders(uavs, tasks, held)
     for trip in trips:
         violations += _trip_violations(trip, rules, held)
@@ -197,31 +200,35 @@ def _excess(trip: Trip) -> float:
 
 def evaluate_legs(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
                   routes: Mapping[str, Trips], legs: Mapping[str, Sequence[Leg]],
-                  held: Held | None = None,
-                  reversed: Collection[str] = ()) -> TimedEvaluation:
+                  held: Held | None = None, reversed: Collection[str] = (),
+                  given: Mapping[str, GivenWaits] | None = None) -> TimedEvaluation:
     """Evaluate routes along their legs.
 
     Args:
-        uavs, tasks, rules, routes, held, reversed: as for `evaluate_routes`.
+        uavs, tasks, rules, routes, held, reversed, given: as for `evaluate_routes`.
         legs: by UAV id; one to each task and to each base at the end of a trip.
 
     Returns:
         As `evaluate_routes`.
     """
-    places, ways = {task.id: (task.position, task.end)
-                    for task in turned_tasks(tasks, reversed)}, {}
-    for uav in uavs:
-        rows = routes.get(uav.id, ())
-        stops = [(uav.position, uav.position)]  # where each begins and ends
-        for number, row in enumerate(rows):
-            stops += [places[name] for name in row]
-            stops += [(uav.base, uav.base)] * (number + 1 < len(rows) or rules.returns)
-        for (_, start), (end, _), leg in zip(stops, stops[1:], legs.get(uav.id, ()),
-                                             strict=False):
-            ways[uav.id, start, end] = leg.length, flight_time(uav, (start, *leg.via, end))
+    return evaluate_routes(uavs, tasks, rules, routes, legs_flown(legs), held, reversed, given)
+
+
+def legs_flown(legs: Mapping[str, Sequence[Leg]]) -> LegOf:
+    """Return what measures legs that are asked for in the order in which they are flown.
+
+    Args:
+        legs: by UAV id.
+
+    Returns:
+        A function of UAV, start and end: length [m] and flight time [s].
+    """
+    rest = {uav_id: iter(row) for uav_id, row in legs.items()}
 
     def leg_of(uav: Uav, start: Point, end: Point) -> tuple[float, float]:
-        # where no safe way leads home the route ends at its last task
-        return ways.get((uav.id, start, end), (0.0, 0.0))
+        leg = next(rest.get(uav.id, iter(())), None)
+        if leg is None:  # where no safe way leads home the route ends at its last task
+            return 0.0, 0.0
+        return leg.length, flight_time(uav, (start, *leg.via, end))
 
-    return evaluate_routes(uavs, tasks, rules, routes, leg_of, held, reversed)
+    return leg_of

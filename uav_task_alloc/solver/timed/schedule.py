@@ -46,6 +46,18 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
+class GivenWaits:
+    """When the trips of a UAV depart at the earliest, and how long it waits before each leg.
+
+    Such trips are not postponed. A wait counts from when the leg would begin: where it is early
+    for the window of a task it waits for that before the leg, too.
+    """
+
+    departures: Sequence[float]  # [s] of each trip
+    waits: Sequence[float]  # [s] before each leg, also of those to the base
+
+
+@dataclass(frozen=True, slots=True)
 class Stop:
     """A task on a trip and the leg to it."""
 
@@ -53,6 +65,7 @@ class Stop:
     seconds: float  # of the leg
     service: float  # [s] with the flight along its path
     is_locked: bool
+    wait: float = 0.0  # [s] before the leg, as given
 
 
 @dataclass(slots=True)
@@ -63,7 +76,7 @@ class Trip:
     number: int  # from 0
     stops: list[Stop]
     metres: float
-    last_leg: float  # [s] to the base; 0 where it ends at its last task
+    last_leg: float  # [s] to the base, with a wait before it; 0 where it ends at its last task
     departure: float = 0.0  # [s]
     end: float = 0.0  # [s]
     arrivals: list[float] = field(default_factory=list)  # [s]
@@ -111,24 +124,29 @@ def straight_legs(rules: Rules) -> LegOf:
 
 
 def scheduled_trips(uav: Uav, rows: Sequence[Sequence[Task]], rules: Rules, leg: LegOf,
-           held: Held) -> list[Trip]:
-    """The trips of a UAV with their times; none where it serves nothing."""
+                    held: Held, given: GivenWaits | None = None) -> list[Trip]:
+    """The trips of a UAV with their times, the best or with what is given; none without tasks."""
     if not any(rows):
         return []
     made: list[Trip] = []
+    waits = iter(given.waits if given else ())
     place, ready = uav.position, uav.available_from
     for number, row in enumerate(rows):
         trip = Trip(uav, number, [], 0.0, 0.0)
         for task in row:
             metres, seconds = leg(uav, place, task.position)
             trip.stops.append(Stop(task, seconds, service_seconds(uav, task),
-                                    held.has_locked(uav, task)))
+                                    held.has_locked(uav, task), next(waits, 0.0)))
             trip.metres += metres + task.path_length
             place = task.end
         if rules.returns or number + 1 < len(rows):
             metres, trip.last_leg = leg(uav, place, uav.base)
             trip.metres += metres
-        _schedule(trip, ready, rules, held)
+            trip.last_leg += next(waits, 0.0)
+        if given:
+            _fly(trip, max(ready, given.departures[number]))
+        else:
+            _schedule(trip, ready, rules, held)
         place, ready = uav.base, trip.end + uav.turnaround
         made.append(trip)
     return made
@@ -151,9 +169,14 @@ def _schedule(trip: Trip, ready: float, rules: Rules, held: Held) -> None:
 def _fly(trip: Trip, departure: float) -> None:
     trip.departure = time = departure
     arrivals, starts = [], []
-    for stop in trip.stops:
+    for k, stop in enumerate(trip.stops):
         task = stop.task
-        time = (time if time > task.release else task.release) + stop.seconds
+        time = time if time > task.release else task.release
+        if stop.wait > 0.0:
+            time = max(time, task.earliest - stop.seconds) + stop.wait
+            if k == 0:
+                trip.departure = time
+        time += stop.seconds
         arrivals.append(time)
         time = time if time > task.earliest else task.earliest
         starts.append(time)
