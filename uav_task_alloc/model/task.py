@@ -13,7 +13,6 @@ from uav_task_alloc.geometry.polyline import polyline_length
 
 Point = tuple[float, float, float]  # [m] ENU
 LONG = 4e9  # [s] bound of all finite times; a message holds 2.1e9
-MOST_VALUE = 1e12  # sums of values stay exact enough
 LONGEST_SERVICE = 1e9  # [s] bound of the service time
 _TASK_TIMES = (('earliest', -math.inf, LONG), ('latest', -LONG, math.inf),
                ('release', -LONG, LONG), ('announced', -LONG, LONG))  # [s]
@@ -76,7 +75,6 @@ class Task:
         put(self, 'value', check_number(place + 'value', self.value, 0.0, open_low=True))
         if math.isinf(self.value):
             raise InvalidValue(place + 'value', self.value, 'a finite number')
-        check_number(place + 'value', self.value, 0.0, MOST_VALUE, open_low=True)
         put(self, 'service_time', check_number(place + 'service_time', self.service_time, 0.0,
                                                LONGEST_SERVICE))
         put(self, 'required_capabilities',

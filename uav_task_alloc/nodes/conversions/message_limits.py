@@ -15,6 +15,7 @@ MOST_TASKS = 10_000  # of an announcement
 MOST_POINTS = MOST_ITEMS - 2  # of a list, tasks and detour points; home and return are items too
 MOST_ACTIONS = 20  # of a task
 MOST_KEYS = 10  # of an action
+MOST_VALUE = 1e12  # of a task; sums of them stay exact enough
 _MOST_NAMES = 100  # capabilities, and allowed UAVs, of one task or UAV
 _LONGEST_TEXT = 200  # characters of a capability or a reason
 

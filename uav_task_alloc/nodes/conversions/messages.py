@@ -17,6 +17,7 @@ from uav_task_alloc.checks import check_member, check_number, check_ros_name
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_limits import (
+    MOST_VALUE,
     check_ros_names,
     check_words,
     cut,
@@ -131,6 +132,7 @@ def to_task(msg: m.Task, origin: Origin, position: Point | None = None) -> Task:
     """
     check_ros_name('task_id', msg.task_id)
     place = f'task {msg.task_id}: '
+    check_number(place + 'value', msg.value, 0.0, MOST_VALUE, open_low=True)
     position = position or task_position(msg, origin)
     assert position is not None  # it is with an origin
     return Task(
