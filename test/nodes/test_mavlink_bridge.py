@@ -95,7 +95,8 @@ class Sky:
 
     def flown(self, n):
         """Tasks by the places that the vehicle really reached so far, in order."""
-        lines = [json.loads(line) for line in self.log.read_text().splitlines()]
+        whole, _, _ = self.log.read_text().rpartition('\n')  # the last line may be under way
+        lines = [json.loads(line) for line in whole.splitlines()]
         return [f'u{n}_{round(line["x"] / 60.0)}' for line in lines
                 if line['uav'] == f'uav_{n}' and line.get('event') == 'item_reached']
 
