@@ -25,6 +25,7 @@ from uav_task_alloc.nodes.conversions.messages import (
 from uav_task_alloc.nodes.live_view import LiveView
 from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.record import diagnostic_records, message_records, run_state
+from uav_task_alloc.record.record_file import read_lines
 from uav_task_alloc.record.reported import ReportedStatus
 from uav_task_alloc.zone_codec import decode_zone
 
@@ -78,6 +79,8 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     assert '1 of 1 tasks completed; 0 zones' in view.output()
     state_of_run = run_state.read_record(tmp_path / 'out')
     assert state_of_run.tasks['t1'].position == (10.0, 20.0, 30.0)
+    lines = read_lines(tmp_path / 'out/record.jsonl')
+    assert next(line for line in lines if line['kind'] == 'announcement')['stamp'] == 5.0
     assert state_of_run.statuses['t1'] == ReportedStatus('COMPLETED', 'uav_1', '')
     assert [(solve.milliseconds, solve.trigger) for solve in state_of_run.solves] == [
         (pytest.approx(100.0), '1 new task')]

@@ -20,10 +20,11 @@ def status(run, state):
         {'task': 't1', 'state': state, 'uav': '', 'reason': ''}]})
 
 
-def test_a_second_add_of_an_open_task_moves_nothing():
+@pytest.mark.parametrize('state', ['ASSIGNED', 'FAILED'])
+def test_a_second_add_of_a_task_moves_nothing_and_an_update_does(state):
     run = RunState()
     announce(run, 'ADD', 100.0, 1.0)
-    status(run, 'ASSIGNED')
+    status(run, state)
     announce(run, 'ADD', 900.0, 3.0)
     assert run.tasks['t1'].position == (100.0, 0.0, 50.0)
     announce(run, 'UPDATE', 200.0, 4.0)
@@ -41,16 +42,6 @@ def test_a_task_that_has_ended_moves_only_after_the_allocator_has_forgotten_it(s
     run.apply({'kind': 'statuses', 'wall': 5.0, 'statuses': []})
     announce(run, 'ADD', 900.0, 6.0)
     assert run.tasks['t1'].position == (900.0, 0.0, 50.0)
-
-
-def test_a_failed_task_moves_by_an_update_and_not_by_an_add():
-    run = RunState()
-    announce(run, 'ADD', 100.0, 1.0)
-    status(run, 'FAILED')
-    announce(run, 'ADD', 900.0, 3.0)
-    assert run.tasks['t1'].position == (100.0, 0.0, 50.0)
-    announce(run, 'UPDATE', 200.0, 4.0)
-    assert run.tasks['t1'].position == (200.0, 0.0, 50.0)
 
 
 def zone_message(zone_id, margin):

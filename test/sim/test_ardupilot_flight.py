@@ -248,3 +248,20 @@ def test_param2_is_no_acceptance_radius(bench):
     bench.fly(waypoint(A, p2=50.0))
     bench.reach(0)
     assert metres_between(bench.flight.body.position, A) < 2.5
+
+
+def test_home_is_where_it_was_armed_last_and_the_local_frame_stays(bench):
+    bench.fly(waypoint(A))
+    bench.pass_time(6.0)
+    bench.set_mode(FlightMode.LAND)
+    bench.until(lambda: not bench.flight.armed)
+    place = bench.flight.body.position
+    assert place[0] > 20.0
+    before, = bench.request('HOME_POSITION')
+    local, = bench.request('LOCAL_POSITION_NED')
+    bench.set_mode(FlightMode.GUIDED)
+    assert bench.arm() == 0
+    after, = bench.request('HOME_POSITION')
+    assert after.longitude > before.longitude
+    assert bench.flight.home == pytest.approx((place[0], place[1], 0.0))
+    assert bench.request('LOCAL_POSITION_NED')[0].y == pytest.approx(local.y, abs=0.1)

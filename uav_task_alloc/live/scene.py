@@ -68,10 +68,10 @@ class Scene:
             self.dirty.add('times')
         elif kind == 'allocation':
             self.new_plans.append(line)
-        clocks = self.run.speedup, self.run.lead.seconds
+        clocks = self.run.speedup, self.run.allocators.lead.seconds
         self.run.apply(line)
         # arrivals and windows are other times then
-        if (self.run.speedup, self.run.lead.seconds) != clocks:
+        if (self.run.speedup, self.run.allocators.lead.seconds) != clocks:
             self.dirty |= {'times', *(
                 f'list {uav}' for uav, each in self.run.lists.items() if each['tasks'])}
 
@@ -94,8 +94,8 @@ class Scene:
         if self.run.forget_silent(now):
             self.dirty.add('uavs')
         waiting = self.run.waiting_plan(now)
-        if (self.run.orders, waiting) != (self.last_orders, self.waiting):
-            self.last_orders, self.waiting = dict(self.run.orders), waiting
+        if (self.run.allocators.orders, waiting) != (self.last_orders, self.waiting):
+            self.last_orders, self.waiting = dict(self.run.allocators.orders), waiting
             self.dirty.add('orders')
         parts = {name: self.part(name) for name in self.dirty}
         for name, before in self.last.items():  # they rarely change
@@ -194,10 +194,11 @@ class Scene:
         plan = self.waiting
         proposal = plan and {
             'revision': plan['revision'], 'trigger': plan['trigger'],
-            'deadline': round(plan['deadline'] + self.run.lead.seconds),
+            'deadline': round(plan['deadline'] + self.run.allocators.lead.seconds),
             'accepted': plan['accepted'], 'changes': plan['changes']}
-        return {'proposal': proposal, 'orders': [
-            [name, text] for each in self.run.orders.values() for name, text in each.items()]}
+        orders = self.run.allocators.orders.values()
+        return {'proposal': proposal,
+                'orders': [[name, text] for each in orders for name, text in each.items()]}
 
     def list(self, uav: str) -> LogEntry:
         """The remaining tasks of a UAV; `at`: expected arrival [unix s].
@@ -246,7 +247,7 @@ class Scene:
             row = {**_span('planned', run.planned.get(name) if name in flown else None, uav=True),
                    **_span('flown', flown.get(name), uav=True)}
             if task.earliest is not None or task.latest is not None:
-                row['window'] = [each and each + run.lead.seconds
+                row['window'] = [each and each + run.allocators.lead.seconds
                                  for each in (task.earliest, task.latest)]
             if row:
                 times[name] = row

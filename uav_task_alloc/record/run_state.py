@@ -10,12 +10,11 @@ from statistics import median
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point, ThreatZone
-from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.piece_ids import split_piece
+from uav_task_alloc.record.allocator_reports import ALLOCATOR_SILENT, AllocatorReports
 from uav_task_alloc.record.clock_comparison import (
     MAX_STAMP_AGE,
     RATE_TOLERANCE,
-    ClockLead,
     rounded_rate,
 )
 from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lists
@@ -32,7 +31,6 @@ from uav_task_alloc.record.reported import (
 from uav_task_alloc.record.ways_home import WaysHome
 from uav_task_alloc.zone_codec import decode_zone
 
-_ALLOCATOR_SILENT = 10.0  # [s] of real time; it reports each second
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
 
@@ -71,10 +69,8 @@ class RunState:
     verified: dict[str, set[int]] = field(default_factory=dict)  # list revisions on board, by UAV
     upload_counts: dict[str, int] = field(default_factory=dict)  # by UAV, from diagnostics
     health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text by UAV
-    uav_warnings: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by UAV
-    orders: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by id
-    allocators: dict[str, float] = field(default_factory=dict)  # [unix s] of the last report
-    lead: ClockLead = field(default_factory=ClockLead)  # by the reports of allocators
+    # what they report of themselves
+    allocators: AllocatorReports = field(default_factory=AllocatorReports)
     proposal: Line | None = None  # the last plan that waited for an operator
     alerts: dict[tuple[str, ...], Line] = field(default_factory=dict)  # in force, by pair
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
@@ -84,7 +80,6 @@ class RunState:
     origin: Origin | None = None  # of the ENU frame; None: not known yet
     measured: bool = True  # `rate` is that of the vehicles' clocks, as no one stated it
     clock_rates: dict[str, float] = field(default_factory=dict)  # of the vehicles, by UAV
-    battery_reserves: dict[str, float] = field(default_factory=dict)  # shares, by allocator
     first: float = math.inf  # [unix s] of the first line
     last: float = -math.inf  # [unix s] of the last line
 
@@ -266,7 +261,7 @@ class RunState:
 
     def planned_at(self, line: Line) -> float:
         """When a list was planned [unix s]; on arrival where its stamp is of another clock."""
-        wall, stamp = line['wall'], line.get('stamp', 0.0) + self.lead.seconds
+        wall, stamp = line['wall'], line.get('stamp', 0.0) + self.allocators.lead.seconds
         # two nodes read /clock up to a tick apart
         return stamp if -self.stretch <= wall - stamp < MAX_STAMP_AGE else float(wall)
 
@@ -293,12 +288,7 @@ class RunState:
         self.upload_counts.update(line['uploads'])
         self.health.update((uav, (level, text))
                            for uav, (level, text) in line.get('health', {}).items())
-        self.uav_warnings.update(line.get('uav_warnings', {}))
-        self.allocators.update(dict.fromkeys(line.get('uav_warnings', {}), line['wall']))
-        if 'stamp' in line:
-            self.lead.add(line['wall'] - line['stamp'], self.stretch)
-        self.orders.update(line.get('orders', {}))
-        self.battery_reserves.update(line.get('battery_reserves', {}))
+        self.allocators.apply(line, self.stretch)
         self.clock_rates.update(line.get('clock_rates', {}))
         if self.measured and self.clock_rates:
             rate = median(self.clock_rates.values())
@@ -314,23 +304,15 @@ class RunState:
 
     def forget_silent(self, wall: float) -> bool:
         """Forget orders and warnings of allocators that have ended; whether there were any."""
-        silent = self._silent_allocators(wall)
-        orders = [self.orders.pop(name) for name in silent if name in self.orders]
-        return any([*orders, *(self.uav_warnings.pop(name) for name in silent
-                               if name in self.uav_warnings)])
-
-    def _silent_allocators(self, wall: float) -> set[str]:
-        return {name for name, at in self.allocators.items()
-                if wall - at > _ALLOCATOR_SILENT * self.stretch}
+        return self.allocators.forget_silent(wall, self.stretch)
 
     def waiting_plan(self, wall: float) -> Line | None:
         """The plan that waits; None after its deadline, or where its allocator has ended."""
         plan = self.proposal
-        if plan is None or not plan['open'] or (
-                self.allocators and self._silent_allocators(wall) == self.allocators.keys()):
+        if plan is None or not plan['open'] or self.allocators.have_ended(wall, self.stretch):
             return None
-        overdue = wall - plan['deadline'] - self.lead.seconds
-        return None if overdue > _ALLOCATOR_SILENT * self.stretch else plan
+        overdue = wall - plan['deadline'] - self.allocators.lead.seconds
+        return None if overdue > ALLOCATOR_SILENT * self.stretch else plan
 
     def is_low(self, battery: float | None) -> bool:
         """Whether a battery is below the reserve of an allocator.
@@ -341,14 +323,12 @@ class RunState:
         Returns:
             False where it is unknown.
         """
-        reserve = max(self.battery_reserves.values(), default=AllocatorParams.battery_reserve)
-        return battery is not None and battery < reserve
+        return battery is not None and battery < self.allocators.battery_reserve
 
     def trouble(self, uav: str) -> str:
         """What is wrong with a UAV, by its bridge and the allocators; '' where all is well."""
         level, text = self.health.get(uav, (0, ''))
-        warnings = [each[uav] for each in self.uav_warnings.values() if uav in each]
-        return '; '.join([text] * bool(level) + warnings)
+        return '; '.join([text] * bool(level) + self.allocators.warnings(uav))
 
     @property
     def uploads(self) -> int:

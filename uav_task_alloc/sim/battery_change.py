@@ -67,4 +67,4 @@ class BatteryChange:
         flight = self._flight
         return (math.isfinite(flight.config.turnaround) and flight.landed and not flight.armed
                 and flight.body.battery < _FULL and flight.body.flown > self._flown
-                and metres_between(flight.body.position, flight.home) <= _AT_HOME)
+                and metres_between(flight.body.position, flight.base) <= _AT_HOME)

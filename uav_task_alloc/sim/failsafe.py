@@ -22,7 +22,7 @@ class FailsafeTexts(NamedTuple):
     """The STATUSTEXTs of one autopilot: (severity, text)."""
 
     begin: dict[str, tuple[tuple[int, str], ...]]  # by kind of failsafe
-    cleared: dict[str, tuple[int, str]]
+    cleared: dict[str, tuple[int, str]]  # where it sends one
     kill: tuple[int, str]
     kill_cleared: tuple[int, str]
 
@@ -40,7 +40,6 @@ _ARDUPILOT = FailsafeTexts(
     cleared={
         'radio': (WARNING, 'Radio Failsafe Cleared'),
         'gcs': (WARNING, 'GCS Failsafe Cleared'),
-        'battery': (WARNING, 'Battery Failsafe Cleared'),
         'ekf': (CRITICAL, 'EKF Failsafe Cleared'),
         'fence': (WARNING, 'Fence Failsafe Cleared'),
     },
@@ -110,11 +109,15 @@ class Interventions:
                 flight.set_custom_mode(mode)
 
     def failsafe_over(self) -> None:
-        """End all failsafes; the mode stays."""
+        """End all failsafes; the mode stays.
+
+        That of the battery ends as by MAV_CMD_BATTERY_RESET where it is ArduPilot.
+        """
         flight = self.flight
         for kind in [kind for kind in flight.failsafes if kind in FAILSAFE_KINDS]:
             del flight.failsafes[kind]
-            flight.texts.append(self._texts.cleared[kind])
+            if kind in self._texts.cleared:
+                flight.texts.append(self._texts.cleared[kind])
             flight.note('failsafe_over', cause=kind)
 
     def kill_switch(self) -> None:

@@ -42,6 +42,7 @@ class Navigation:
         self.acceptance_radius = self.default_radius if radius is None else radius  # [m]
         self.body = PointMass(config)
         self.home: Point = config.position if config.home is None else config.home
+        self.base = self.home  # of the local frame; where the crew is
         self.home_amsl = to_geodetic(config.origin, self.home)[2]  # [m]
         self.seq = 0  # of MISSION_CURRENT
         self.track: Track | None = None

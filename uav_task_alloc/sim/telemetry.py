@@ -83,10 +83,10 @@ class TelemetryMessages:
         flight = self._flight
         if not flight.positioned:
             return None
-        (x, y, z), (vx, vy, vz), home = flight.body.position, flight.body.velocity, flight.home
+        (x, y, z), (vx, vy, vz), base = flight.body.position, flight.body.velocity, flight.base
         dx, dy, dz = self._estimate.offset
         return dialect.MAVLink_local_position_ned_message(
-            self._boot_ms, y + dy - home[1], x + dx - home[0], home[2] - z - dz, vy, vx, -vz)
+            self._boot_ms, y + dy - base[1], x + dx - base[0], base[2] - z - dz, vy, vx, -vz)
 
     def gps_raw(self) -> Message:
         boot_us = self._boot_ms * 1000

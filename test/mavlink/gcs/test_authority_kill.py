@@ -50,7 +50,7 @@ def test_a_kill_on_the_way_home_is_no_landing(kind, relaunch, by):
 
 
 def on_its_way_home(kind):
-    """The flight of a UAV whose list has ended, and that relaunches by itself."""
+    """The flight of a UAV whose list has ended, with `relaunch: automatic`."""
     bench = AuthorityBench(kind, relaunch='automatic').discover()
     bench.assign(task_list('A', 1, returns=True))
     assert bench.run(lambda: bench.completed() == ['A'], 200.0)

@@ -105,7 +105,8 @@ def valid_tasks(msg: m.TaskAnnouncement, origin: Origin | None) -> m.TaskAnnounc
             return False
         return True
 
-    return m.TaskAnnouncement(action=msg.action, tasks=list(filter(is_valid, msg.tasks)))
+    return m.TaskAnnouncement(header=msg.header, action=msg.action,
+                              tasks=list(filter(is_valid, msg.tasks)))
 
 
 def from_verdicts(verdicts: list[TaskVerdict],

@@ -71,6 +71,13 @@ class ArduPilotFlight(VehicleFlight):
         """MISSION_STATE of the stored mission."""
         return int(_REPORTED_STATES[self.run])
 
+    def arm(self, force: bool = False) -> bool:
+        was_armed, armed = self.armed, super().arm(force)
+        if armed and not was_armed and self.landed:  # AP_Arming_Copter: home is where it arms
+            x, y, _ = self.body.position
+            self.home = x, y, self.home[2]
+        return armed
+
     def arming_refusal(self) -> str:
         mode, number = self.modes[self.custom_mode], self.custom_mode
         armable = number in _GUIDED or (mode.stick and number not in COPTER_NOT_ARMABLE)
