@@ -9,6 +9,7 @@ import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.time import Time
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import HandOver
 
@@ -86,12 +87,18 @@ class Sky:
                 if e.uav_id == f'uav_{n}' and e.event == m.TaskEvent.COMPLETED]
 
     def fact(self, n, key):
-        """What the diagnostics say of a vehicle now."""
-        self.health.clear()
-        self.probe.until(lambda: any(s.hardware_id == f'uav_{n}' for a in self.health
-                                     for s in a.status))
-        return next(v.value for s in self.health[-1].status if s.hardware_id == f'uav_{n}'
-                    for v in s.values if v.key == key)
+        """What the diagnostics say of a vehicle now: older ones may still be on their way."""
+        begin = self.probe.node.get_clock().now().nanoseconds
+        values = []
+
+        def is_said():
+            values[:] = (v.value for array in self.health for s in array.status for v in s.values
+                         if Time.from_msg(array.header.stamp).nanoseconds > begin
+                         and s.hardware_id == f'uav_{n}' and v.key == key)
+            return values
+
+        self.probe.until(is_said)
+        return values[-1]
 
     def flown(self, n):
         """Tasks by the places that the vehicle really reached so far, in order."""

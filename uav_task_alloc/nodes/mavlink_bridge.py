@@ -258,14 +258,14 @@ class MavlinkBridge(Node):
 
     def publish_diagnostics(self) -> None:
         """Publish the state of vehicles, links and threads."""
-        now = time.monotonic()
+        now, stamp = time.monotonic(), self.stamp()
         with self.lock:
             if self.store is not None:
                 self.store.retry()
             rows = self.report.vehicle_rows(now)
         self.origins.check()
         rows += self.report.part_rows(self.origins.conflict())
-        self.diagnostics.publish(from_diagnostics(rows, self.stamp()))
+        self.diagnostics.publish(from_diagnostics(rows, stamp))
 
     def stamp(self) -> float:
         """The published clock [s]."""
