@@ -3,6 +3,9 @@
 import pytest
 from authority_bench import BOTH, MODES, AuthorityBench, H, L, sends_no_command
 from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+POSITIONS = ('EXTENDED_SYS_STATE', 'GLOBAL_POSITION_INT', 'LOCAL_POSITION_NED')
 
 
 def climbing_to_100_m(kind):
@@ -54,3 +57,28 @@ def test_a_climb_that_another_ended_while_suspended_is_a_loss(kind):
     bench.vehicles[1].failsafe_over()
     assert bench.reaches(L, 20.0)
     assert sends_no_command(bench)
+
+
+@pytest.mark.parametrize('state_lost', [False, True])
+@BOTH
+def test_a_take_off_whose_answer_is_lost_is_no_refusal(kind, state_lost):
+    """ArduPilot refuses the second command, as it climbs by the first one."""
+    bench = AuthorityBench(kind, cruise_altitude=100.0,
+                           configs={1: {'climb_rate': 2.5}}).discover()
+    lost = []
+
+    def lose(direction, message, now):
+        kind_of = message.get_type()
+        if kind_of == 'COMMAND_ACK' and message.command == d.MAV_CMD_NAV_TAKEOFF:
+            lost.append(now)
+            return [] if len(lost) == 1 else None
+        mute = state_lost and lost and now < lost[0] + 7.0
+        return [] if mute and kind_of in POSITIONS else None
+
+    bench.line.tampers.append(lose)
+    bench.assign(task_list('ABC'))
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == MODES[kind].mission, 120.0)
+    assert lost
+    assert bench.vehicles[1].flight.body.position[2] >= 89.0
+    assert bench.authority() is H
+    assert state_lost or not any('take off' in note for note in bench.notes)

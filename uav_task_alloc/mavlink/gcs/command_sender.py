@@ -82,6 +82,13 @@ class CommandSender:
                 and telemetry.landed != d.MAV_LANDED_STATE_ON_GROUND)
 
     @property
+    def left_ground(self) -> bool:
+        """Whether telemetry shows that a vehicle that stood on the ground takes off."""
+        telemetry = self._telemetry
+        return telemetry.mode is ModeFunction.TAKEOFF or (
+            telemetry.airborne and telemetry.landed != d.MAV_LANDED_STATE_ON_GROUND)
+
+    @property
     def _needs_hold(self) -> bool:
         """Whether HOLD comes before arming and climbing.
 
@@ -286,10 +293,11 @@ class CommandSender:
         ground = telemetry.altitude - (
             0.0 if math.isnan(telemetry.height) else telemetry.height)
         takeoff = self._profile.takeoff_command(self._peer, height, ground)
-        return self.start(Command('take off', takeoff,
-                                  lambda: telemetry.mode is ModeFunction.TAKEOFF,
+        # ArduPilot refuses one that it has executed: its ACK may be lost
+        return self.start(Command('take off', takeoff, lambda: self.left_ground,
+                                  retry_refused=True,
                                   wanted=lambda: wanted() and not self.climbs_by_mission),
-                          now, self._took_off)
+                          now, self.took_off)
 
     def disarm(self, now: float) -> list[Message]:
         """Disarm on the ground, after arming by the bridge, when there is nothing to fly."""
@@ -301,7 +309,12 @@ class CommandSender:
     def _armed(self, now: float) -> None:
         self._telemetry.armed = self.armed_here = True
 
-    def _took_off(self, now: float) -> None:
+    def took_off(self, now: float) -> None:
+        """Wait for the height of the take-off: the vehicle executes it.
+
+        Args:
+            now: steady time [s].
+        """
         self.climbing, self.armed_here = True, False
         self.commanded = ModeFunction.TAKEOFF
 

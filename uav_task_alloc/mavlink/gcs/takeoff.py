@@ -44,6 +44,8 @@ class Takeoff:
         """Let a vehicle that we armed take off before anything else is sent, or disarm it."""
         if self._sender.climbs_by_mission:
             self._sender.armed_here = False
+        if self._sender.armed_here and self._sender.left_ground and self._authority.held:
+            self._sender.took_off(now)  # neither an ACK nor telemetry showed it in time
         if not self._sender.armed_here or self._telemetry.airborne or not self._authority.held:
             return None
         return self.take_off(now) if self._wants_to_fly() else self._sender.disarm(now)
