@@ -76,6 +76,24 @@ def test_the_last_moment_to_turn_is_published_and_kept():
     assert any('the last moment' in note for note in made.notes)
 
 
+@pytest.mark.parametrize('rate', [1, 20, 100])
+def test_a_uav_turns_in_time_however_fast_the_simulated_clock_is(rate):
+    made, stamp, charge = driver(battery_reserve=0.0), 100.0, 1.0
+    uav(made, 0, charge)
+    made.add(at('t1', 1000), at('t2', 1400))
+    made.settle()
+    x, step = 0.0, 0.05 * rate
+    while not made.world.fleet.records['a'].low:
+        x += SPEED * step
+        assert x < FULL
+        charge -= SPEED * step / FULL
+        made.now, stamp = made.now + 0.05, stamp + step
+        uav(made, x, charge)
+        made.core.tick(made.now, stamp)
+    left = FULL * charge - x  # beyond the way home; a check may be a second or a step later
+    assert -2.0 * SPEED * max(step, 1.0) - 2.0 <= left <= 2.0 * SPEED * step
+
+
 def test_a_uav_that_has_turned_returns_until_it_is_on_the_ground():
     made = driver()
     uav(made, 600, 0.39)

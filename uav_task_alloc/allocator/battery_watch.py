@@ -13,7 +13,7 @@ from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point
 
-_PERIOD = 1.0  # [s] steady clock between two checks
+_PERIOD = 1.0  # [s] between two checks, by the clock that is faster: steady or published
 _CLOSE = 60.0  # [s] before the last moment in which the way home is searched for at each check
 _SEARCH = 20.0  # [s] between two searches before that
 _ASK_AGAIN = 5.0  # [s] between two plans that are requested for one UAV
@@ -31,16 +31,19 @@ class BatteryWatch:
     def __init__(self, world: World) -> None:
         self._world = world
         self.turns: dict[str, float] = {}  # [s] published clock: the last moment, by UAV
-        self._checked = -math.inf  # [s] steady clock
+        self._checked = self._checked_at = -math.inf  # [s] steady clock, published clock
         self._ways: dict[str, tuple[Point, float, float]] = {}  # from where, metres, when
         self._asked: dict[str, float] = {}  # [s] steady clock
 
     def tick(self, now: float, stamp: float) -> None:
         """Check all UAVs in flight; `now` [s] steady, `stamp` [s] published clock."""
         world = self._world
-        if now - self._checked < _PERIOD or not world.kernels_ready:
+        passed = abs(stamp - self._checked_at)
+        if max(now - self._checked, passed) < _PERIOD or not world.kernels_ready:
             return
-        self._checked = now
+        # a simulated clock may be so fast that the last moment is between two checks
+        lead = passed if _PERIOD < passed < _CLOSE and now - self._checked < passed else 0.0
+        self._checked, self._checked_at = now, stamp
         turns: dict[str, float] = {}
         for uav_id, record in world.uav_records().items():
             metres, seconds = self._above_reserve(record)
@@ -52,7 +55,7 @@ class BatteryWatch:
             turns[uav_id] = stamp + left
             if record.low:
                 continue
-            if left < 0.0:
+            if left < lead:
                 world.fleet.turn(uav_id)
                 world.note(f'{uav_id} turns home: the last moment by its battery '
                            f'({100.0 * (record.battery or 0.0):.0f} %)', warning=True)
