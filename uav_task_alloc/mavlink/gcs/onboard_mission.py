@@ -57,6 +57,9 @@ class OnboardMission:
         self.revision = 0  # of the last list verified on board
         self.notes: deque[OperatorNote] = deque()
         self.transfer_failed = False  # the last one; the caller schedules the next attempt
+        # PX4 ignores a command to set the current item while its mission is read
+        self.upload.may_read = lambda: not profile.atomic or not (
+            self.upload.events or self.next_item() is not None)
         self.set_current_to: int | None = None  # seq to set, unless the upload has set it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._at_start: object = None  # of the upload: tasks done, detour points left out
@@ -179,7 +182,7 @@ class OnboardMission:
         elif self._reports.sent_since is None:
             self._reports.note_sent(self._telemetry.frame)
         self._settle(now)
-        return out
+        return out + self.upload.begin_readback(now)
 
     def step(self, now: float) -> list[Message]:
         """Advance time; returns the messages to send."""

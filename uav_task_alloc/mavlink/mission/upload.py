@@ -35,6 +35,7 @@ COUNT_PERIOD, COUNT_TRIES = 1.0, 5  # [s], only until the first request
 INACTIVITY = 10.0  # [s] without a request; the whole transfer has no limit
 CONFIRM = 1.5  # [s] for the final ACK, which a link may lose
 GRACE = 2.0  # [s] after an ERROR, in which requests may go on
+READ_DELAY = 3.0  # [s] at most until a readback begins, which another command has to precede
 ERROR_BACKOFF = (5.0, 8.0)  # [s] drawn between
 DENIED_BACKOFF = (8.0, 12.0)  # [s] drawn between; another ground station is uploading
 SUPERSEDED = 'superseded by tasks completed meanwhile or by a newer list'
@@ -72,6 +73,7 @@ class Upload:
         self.uploads = 0  # started so far
         self.is_superseded: Callable[[], bool] = lambda: False  # it would not be retried unchanged
         self.may_end: Callable[[], bool] = lambda: True  # its last item may be sent
+        self.may_read: Callable[[], bool] = lambda: True  # its readback may begin
         # called with items read back that are not those accepted, and the time [s]
         self.on_difference: Callable[[tuple[Item, ...], float], object] = lambda held, now: None
         self._out: list[Message] = []
@@ -79,6 +81,7 @@ class Upload:
         self._read_pending = False
         self._mission: Mission | None = None  # None while only reading
         self._readback: Download | None = None
+        self._read_by = 0.0  # [s] begin of the readback at the latest
         self._tries = self._counts = 0
         self._due = 0.0
         self._requested: int | None = None
@@ -153,10 +156,19 @@ class Upload:
         if self.state is UploadState.READING and self._readback:
             self._out += self._readback.step(now)
             self._judge_readback(now)
+        elif self.state is UploadState.READING:
+            return self.begin_readback(now)
         elif self.busy and now >= self._due:
             unsure = (self.state is UploadState.GRACE and self._sent_last
                       and self._error_when_closed)
             self._go(UploadEvent.UNSURE if unsure else UploadEvent.TIMEOUT, now)
+        return self._flush()
+
+    def begin_readback(self, now: float) -> list[Message]:
+        """Begin a readback that had to wait, if it may begin now, or has waited for long."""
+        if self.state is UploadState.READING and self._readback is None and (
+                self.may_read() or now >= self._read_by):
+            self._start_readback(now)
         return self._flush()
 
     def _flush(self) -> list[Message]:
@@ -231,14 +243,19 @@ class Upload:
         if new is UploadState.COUNTING:
             self._count(now)
         elif new is UploadState.READING:
-            self._readback = Download(self._peer, now)
-            self._out.append(self._readback.first)
+            self._readback, self._read_by = None, now + READ_DELAY
+            if self.may_read():
+                self._start_readback(now)
         elif new is UploadState.DRAINING and event is UploadEvent.STALE:
             self._out.append(self._peer.ack(dialect.MAV_MISSION_OPERATION_CANCELLED))
         elif new is UploadState.IDLE:
             self._begin(now)
             return
         self._due = now + self._limit(new, event)
+
+    def _start_readback(self, now: float) -> None:
+        self._readback = Download(self._peer, now)
+        self._out.append(self._readback.first)
 
     def _limit(self, state: UploadState, event: UploadEvent) -> float:
         if state is UploadState.BACKOFF:
