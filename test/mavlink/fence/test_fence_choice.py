@@ -127,6 +127,18 @@ def test_the_area_is_an_inclusion_and_waits_for_a_plan_inside():
     assert 'fence_area' in choose_fence([], area, outside, 70, ORIGIN).waiting
 
 
+def test_an_area_of_more_corners_than_the_store_has_is_named_and_the_zones_are_carried():
+    corners = tuple((900.0 * math.cos(k * math.tau / 20), 900.0 * math.sin(k * math.tau / 20))
+                    for k in range(20))
+    area = FenceShape('', corners=corners, inclusion=True)
+    zone = ThreatZone.cylinder('z', (500.0, 0.0), 50.0)
+    fence = choose_fence([zone], area, FlightSpace(), 15, ORIGIN)
+    assert [shape.zone for shape in fence.shapes] == ['z']
+    assert fence.no_space == ('fence_area',)
+    assert choose_fence([zone], area, FlightSpace(), 21, ORIGIN).no_space == ()
+    assert choose_fence([zone], area, FlightSpace(), 20, ORIGIN).no_space == ('z',)
+
+
 def test_a_circle_that_is_read_back_smaller_is_not_alike():
     items = fence_items([FenceShape('c', (10.0, 20.0), 35.25)], ORIGIN)
     assert fences_alike(items, items)

@@ -20,6 +20,8 @@ from uav_task_alloc.mavlink.fence.shapes import (
 )
 from uav_task_alloc.model import Point, Shape, ThreatZone
 
+_AREA = 'fence_area'  # its id where the fence does not carry it
+
 
 @dataclass(frozen=True, slots=True)
 class FlightSpace:
@@ -52,7 +54,7 @@ class Fence:
     shapes: tuple[FenceShape, ...] = ()  # in their order on board
     free_side: dict[str, str] = field(default_factory=dict)  # why, by id of a zone with a height
     waiting: dict[str, str] = field(default_factory=dict)  # why it would breach, by id of a zone
-    no_space: tuple[str, ...] = ()  # ids of zones for which the store has no points
+    no_space: tuple[str, ...] = ()  # ids of zones for which the store has no points, or _AREA
 
     @property
     def points(self) -> int:
@@ -68,6 +70,7 @@ def choose_fence(zones: Iterable[ThreatZone], area: FenceShape | None, space: Fl
     A zone with a height is carried only where the UAV cannot use its free side. A zone that the
     UAV or its plan is in waits, unless it is on board already. Polygons are simplified outwards
     until all fit, never over a planned leg; then the zones farthest from the plan are left out.
+    An area of more corners than the budget is left out.
 
     Args:
         zones: with their margins.
@@ -99,8 +102,10 @@ def choose_fence(zones: Iterable[ThreatZone], area: FenceShape | None, space: Fl
     if area is not None and (area in carried or not space.enters(area)):
         fixed = [area]
     elif area is not None:
-        waiting['fence_area'] = 'the UAV or its plan is outside'
-    left_out = _fit(chosen, budget - sum(shape.points for shape in fixed), space)
+        waiting[_AREA] = 'the UAV or its plan is outside'
+    too_large = [_AREA for shape in fixed if shape.points > budget]
+    fixed = [] if too_large else fixed
+    left_out = (*too_large, *_fit(chosen, budget - sum(shape.points for shape in fixed), space))
     # PX4 reads a polygon after a circle wrongly
     shapes = (*fixed, *sorted((choice.shape for choice in chosen),
                               key=lambda shape: not shape.corners))
