@@ -9,7 +9,7 @@ from fence_bench import ENABLED, FENCE, FIELD, TOWER, FenceBench, FenceState
 from mission_bench import ack, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.fence.shapes import CIRCLES
+from uav_task_alloc.mavlink.fence.shapes import CIRCLES, FenceShape
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.sim.stored_item import StoredItem
@@ -252,6 +252,33 @@ def test_require_waits_for_a_verified_fence_that_is_enabled():
                                                    d.MAV_PARAM_TYPE_INT8))
     assert bench.run(lambda: bench.completed() == ['A'])
     assert not [m for _, way, m in bench.line.log if way == 'up' and m.get_type() == 'PARAM_SET']
+
+
+AREA = FenceShape('', corners=((-100.0, -100.0), (400.0, -100.0), (400.0, 60.0),
+                               (-100.0, 60.0)), inclusion=True)
+
+
+@BOTH
+def test_require_takes_no_vehicle_off_whose_list_leaves_the_area_on_board(kind):
+    bench = FenceBench(kind, zones=(), fences='require', fence_area=AREA).settle()
+    bench.assign(task_list('A'))  # 40 m outside
+    assert bench.run(lambda: 'fence_area' in bench.executor().sender.waits_for)
+    bench.run(limit=30.0)
+    assert not bench.vehicle.flight.armed
+    assert 'will be breached: fence_area' in bench.fence.warning
+    assert any('will be breached: fence_area' in note for note in bench.notes)
+
+
+@BOTH
+def test_a_list_that_leaves_the_area_on_board_in_flight_is_a_warning(kind):
+    area = replace(AREA, corners=((-100.0, -100.0), (400.0, -100.0), (400.0, 150.0),
+                                  (-100.0, 150.0)))
+    bench = FenceBench(kind, zones=(), fence_area=area).settle()
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.started() == ['A'])
+    assert not bench.fence.warning
+    bench.assign(task_list('ABF', revision=2))
+    assert bench.run(lambda: 'will be breached: fence_area' in bench.fence.warning, 5.0)
 
 
 @BOTH

@@ -20,7 +20,8 @@ from uav_task_alloc.mavlink.fence.shapes import (
 )
 from uav_task_alloc.model import Point, Shape, ThreatZone
 
-_AREA = 'fence_area'  # its id where the fence does not carry it
+_AREA = 'fence_area'  # its id in texts
+_INSIDE, _OUTSIDE = 'the UAV or its plan is inside', 'the UAV or its plan is outside'
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,7 @@ class Fence:
     shapes: tuple[FenceShape, ...] = ()  # in their order on board
     free_side: dict[str, str] = field(default_factory=dict)  # why, by id of a zone with a height
     waiting: dict[str, str] = field(default_factory=dict)  # why it would breach, by id of a zone
+    breached: dict[str, str] = field(default_factory=dict)  # on board, and why it will be, by id
     no_space: tuple[str, ...] = ()  # ids of zones for which the store has no points, or _AREA
 
     @property
@@ -68,9 +70,9 @@ def choose_fence(zones: Iterable[ThreatZone], area: FenceShape | None, space: Fl
     """Choose the fence of one UAV.
 
     A zone with a height is carried only where the UAV cannot use its free side. A zone that the
-    UAV or its plan is in waits, unless it is on board already. Polygons are simplified outwards
-    until all fit, never over a planned leg; then the zones farthest from the plan are left out.
-    An area of more corners than the budget is left out.
+    UAV or its plan is in waits; one that is on board already stays, and is named. Polygons are
+    simplified outwards until all fit, never over a planned leg; then the zones farthest from the
+    plan are left out. So is an area of more corners than the budget.
 
     Args:
         zones: with their margins.
@@ -85,6 +87,7 @@ def choose_fence(zones: Iterable[ThreatZone], area: FenceShape | None, space: Fl
     """
     free_side: dict[str, str] = {}
     waiting: dict[str, str] = {}
+    breached: dict[str, str] = {}
     chosen: list[_Choice] = []
     carried = set(onboard)
     for zone in zones:
@@ -92,24 +95,28 @@ def choose_fence(zones: Iterable[ThreatZone], area: FenceShape | None, space: Fl
         first = next(_shapes_of(zone, origin))
         if reason:
             free_side[zone.id] = reason
-        elif not space.enters(first) or (first in carried and not _is_limited(zone)):
+        elif not space.enters(first):
             chosen.append(_Choice(zone, first, space, origin))
+        elif first in carried and not _is_limited(zone):
+            chosen.append(_Choice(zone, first, space, origin))
+            breached[zone.id] = _INSIDE
         elif _is_limited(zone):
             free_side[zone.id] = 'the plan passes over or under it, and a fence has no height'
         else:
-            waiting[zone.id] = 'the UAV or its plan is inside'
+            waiting[zone.id] = _INSIDE
     fixed = []
-    if area is not None and (area in carried or not space.enters(area)):
+    leaves = area is not None and space.enters(area)
+    if area is not None and (area in carried or not leaves):
         fixed = [area]
-    elif area is not None:
-        waiting[_AREA] = 'the UAV or its plan is outside'
+    if leaves:
+        (breached if fixed else waiting)[_AREA] = _OUTSIDE
     too_large = [_AREA for shape in fixed if shape.points > budget]
     fixed = [] if too_large else fixed
     left_out = (*too_large, *_fit(chosen, budget - sum(shape.points for shape in fixed), space))
     # PX4 reads a polygon after a circle wrongly
     shapes = (*fixed, *sorted((choice.shape for choice in chosen),
                               key=lambda shape: not shape.corners))
-    return Fence(shapes, free_side, waiting, left_out)
+    return Fence(shapes, free_side, waiting, breached, left_out)
 
 
 def _is_limited(zone: ThreatZone) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import random
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -220,6 +220,8 @@ class VehicleFence:
             return 'the zones (fences: require)'
         if self.fence.no_space or self.fence.waiting:
             return f'its fence: {self.left_out}'
+        if self.fence.breached:
+            return f'a list that its fence allows: {_joined_reasons(self.fence.breached)}'
         if not self.verified:
             return f'its fence: {self.text}'
         if self.fence.shapes and not self.parameters.enabled:
@@ -251,9 +253,12 @@ class VehicleFence:
     def left_out(self) -> str:
         """The zones that are not on board and why; '': all are."""
         parts = [f'{zone}: no space on board' for zone in self.fence.no_space]
-        for group in (self.fence.waiting, self.fence.free_side):
-            parts += [f'{zone}: {reason}' for zone, reason in group.items()]
+        parts += map(_joined_reasons, filter(None, (self.fence.waiting, self.fence.free_side)))
         return '; '.join(parts)
+
+    @property
+    def _breach(self) -> str:
+        return f'the fence on board will be breached: {_joined_reasons(self.fence.breached)}'
 
     @property
     def warning(self) -> str:
@@ -263,6 +268,8 @@ class VehicleFence:
             parts.append(f'fence {self.parameters.text}')
         if self.active and (self.fence.no_space or self.fence.waiting):
             parts.append(f'fence without {self.left_out}')
+        if self.active and self.fence.breached:
+            parts.append(self._breach)
         if blocked := self._onboard.list.way_home.blocked:
             parts.append(blocked)
         if self.way_home:
@@ -292,6 +299,8 @@ class VehicleFence:
             text += f'; {self.parameters.text}'
         if self.left_out:
             text += f'; not on board: {self.left_out}'
+        if self.fence.breached:
+            text += f'; {self._breach}'
         if text != self._reported:
             self._reported = text
             self.notes.append(OperatorNote('warning' if self.warning else 'info', text))
@@ -367,3 +376,7 @@ class VehicleFence:
             self._is_blocked = any(key[0].enters(shape) for items in key[1]
                                    for shape in shapes_of_items(items, self._origin))
         return self._is_blocked
+
+
+def _joined_reasons(reasons: Mapping[str, str]) -> str:
+    return '; '.join(f'{zone}: {reason}' for zone, reason in reasons.items())
