@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that are replaced atomically, and what makes a change of a folder survive a crash."""
+"""Files that are replaced atomically, or read whole; changes of folders that survive a crash."""
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 
 
@@ -27,6 +28,29 @@ def replace_file(path: Path, text: str) -> None:
         temporary.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def read_file(path: Path, limit: int) -> str:
+    """Read a small file; never waits, as for the writer of a pipe.
+
+    Args:
+        path: of the file.
+        limit: [bytes] of its length.
+
+    Returns:
+        Its content, as UTF-8.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is longer, no regular file, or not UTF-8.
+    """
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 'rb') as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise ValueError('no regular file')
+        data = file.read(limit + 1)
+    if len(data) > limit:
+        raise ValueError(f'larger than {limit} bytes')
+    return data.decode('utf-8')
 
 
 def sync_folder(folder: Path) -> None:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fences on both simulated autopilots, one fault at a time."""
 import math
+import os
 from dataclasses import replace
 
 import pytest
@@ -312,6 +313,34 @@ def test_a_restarted_bridge_knows_its_own_fence_by_its_files(tmp_path):
     bench.start()
     bench.settle(FenceState.FOREIGN)
     assert any('counts as that of another station' in note for note in bench.notes)
+
+
+@pytest.mark.parametrize('text', [
+    '{"uav_id": "uav_1", "items": [[5003, 3.5, 4e3977000, 85456001]]}', '[' * 60000,
+    '{"uav_id": "uav_1", "items": [[1e999, 3.5, 1, 2]]}', 'pipe'])
+def test_a_fence_file_that_cannot_be_used_is_reported_and_the_uav_is_bridged(tmp_path, text):
+    bench = FenceBench('px4', folder=str(tmp_path)).settle()
+    path = next(tmp_path.glob('fence_*'))
+    if text == 'pipe':
+        path.unlink()
+        os.mkfifo(path)
+    else:
+        path.write_text(text)
+    bench.start()
+    bench.settle()
+    assert any('counts as that of another station' in note for note in bench.notes)
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf])
+@pytest.mark.parametrize('name', ['FENCE_TYPE', 'FENCE_ACTION'])
+def test_a_fence_parameter_that_is_no_number_is_not_known(name, value):
+    bench = FenceBench('ardupilot', config={'parameters': (
+        *ENABLED['ardupilot'], (name, value))}, fences='require').discover()
+    bench.run(lambda: bench.fence.verified, 60.0)
+    bench.assign(task_list('A'))
+    bench.run(limit=60.0)
+    assert not bench.ground_station.sessions[1].fault
+    assert bench.fence.parameters.enabled is (None if name == 'FENCE_TYPE' else True)
 
 
 # a flight of a pilot, which the bridge was not granted

@@ -157,7 +157,9 @@ def test_a_hold_file_that_cannot_be_used_is_reported(tmp_path):
     assert store.load_hold('uav_1') == ''
     store.path('uav_1').write_text('{"uav_id": "uav_2", "reason": "x"}')
     assert store.load_hold('uav_1') == ''
-    assert len(reports) == 2
+    store.path('uav_1').write_text('[' * 4000)
+    assert store.load_hold('uav_1') == ''
+    assert len(reports) == 3
     assert all('not used' in text for text in reports)
 
 

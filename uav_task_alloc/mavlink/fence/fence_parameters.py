@@ -70,6 +70,8 @@ class FenceParameters:
         value = float(message.param_value)
         if self._profile.name == 'px4' and message.param_type in _INTEGERS:
             value = float(struct.unpack('<i', struct.pack('<f', value))[0])  # sent by its bytes
+        if not math.isfinite(value):
+            return
         self.values[message.param_id] = value
         self._note_return_height()
         self._asked.pop(message.param_id, None)

@@ -11,14 +11,13 @@ import hashlib
 import json
 import math
 import os
-import stat
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 from urllib.parse import quote
 
-from uav_task_alloc.atomic_files import replace_file, sync_folder
+from uav_task_alloc.atomic_files import read_file, replace_file, sync_folder
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs.authority_state import (
     UNUSABLE,
@@ -105,7 +104,7 @@ class AuthorityFileStore:
         """
         path = self.path(uav_id)
         try:
-            body = json.loads(_read(path))
+            body = json.loads(read_file(path, _FILE_LIMIT))
             record = _record(body, uav_id)
         except FileNotFoundError:
             return None
@@ -180,20 +179,10 @@ class AuthorityFileStore:
         return json.dumps(body, indent=1, allow_nan=False) + '\n'
 
 
-def _read(path: Path) -> str:
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 'rb') as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise ValueError('no regular file')
-        data = file.read(_FILE_LIMIT + 1)
-    if len(data) > _FILE_LIMIT:
-        raise ValueError(f'larger than {_FILE_LIMIT} bytes')
-    return data.decode('utf-8')
-
-
 def _position(path: Path) -> tuple[float, ...]:
     """The last position; () where the file of a record has none that can be used."""
     try:
-        values = json.loads(_read(path.with_suffix(_POSITION_SUFFIX)))
+        values = json.loads(read_file(path.with_suffix(_POSITION_SUFFIX), _FILE_LIMIT))
         usable = isinstance(values, list) and all(
             type(value) in (int, float) and math.isfinite(value) for value in values)
     except (OSError, ValueError, RecursionError):

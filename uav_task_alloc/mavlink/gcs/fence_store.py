@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Protocol
 
-from uav_task_alloc.atomic_files import replace_file
+from uav_task_alloc.atomic_files import read_file, replace_file
 from uav_task_alloc.mavlink.fence.onboard_fence import ItemKey
 from uav_task_alloc.mavlink.gcs.authority_store import uav_file_name
 
@@ -47,14 +47,14 @@ class FenceFileStore:
         """Return the items saved last; none where there is no file, or it is unusable."""
         path = self.path(uav_id)
         try:
-            with path.open('rb') as file:
-                body = json.loads(file.read(_FILE_LIMIT))
+            body = json.loads(read_file(path, _FILE_LIMIT))
             if body['uav_id'] != uav_id:
                 raise ValueError('not the fence of this UAV')
             return frozenset((int(c), float(p), int(x), int(y)) for c, p, x, y in body['items'])
         except FileNotFoundError:
             return frozenset()
-        except (OSError, ValueError, LookupError, TypeError) as error:
+        except (OSError, ValueError, LookupError, TypeError, OverflowError,
+                RecursionError) as error:
             self._report(f'{path}: {error or type(error).__name__}: not used; a fence of the '
                          f'bridge on {uav_id} counts as that of another station')
             return frozenset()

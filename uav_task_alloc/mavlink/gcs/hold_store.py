@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from uav_task_alloc.atomic_files import replace_file
+from uav_task_alloc.atomic_files import read_file, replace_file
 from uav_task_alloc.mavlink.gcs.authority_store import uav_file_name
 
 _FILE_LIMIT = 4096  # [bytes] of a file that is read
@@ -46,14 +46,13 @@ class HoldFileStore:
         """Return the reason of the hold saved last; '' where there is none, or it is unusable."""
         path = self.path(uav_id)
         try:
-            with path.open('rb') as file:
-                body = json.loads(file.read(_FILE_LIMIT))
+            body = json.loads(read_file(path, _FILE_LIMIT))
             if body['uav_id'] != uav_id or not str(body['reason']).isprintable():
                 raise ValueError('not the hold of this UAV')
             return str(body['reason'])
         except FileNotFoundError:
             return ''
-        except (OSError, ValueError, LookupError, TypeError) as error:
+        except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
             self._report(f'{path}: {error or type(error).__name__}: not used; {uav_id} is not '
                          'held until the allocator says so again')
             return ''
