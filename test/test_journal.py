@@ -226,3 +226,16 @@ def test_finding_23_the_rows_on_both_sides_of_a_corrupt_page_are_recovered(tmp_p
     recovered = {row.id for row in recover_rows(set_aside(str(tmp_path)))}
     assert {'000', '299'} <= recovered
     assert 200 <= len(recovered) < 300
+
+
+def test_a_damage_that_sqlite_quotes_in_its_error_is_a_damage(tmp_path):
+    journal = Journal(tmp_path)
+    journal.put([JournalRow('a', '1', 1)])
+    journal.close()
+    path = tmp_path / FILE_NAME
+    held = path.read_bytes()
+    at = held.index(b'CREATE TABLE world')
+    path.write_bytes(held[:at + 9] + b'\xac' + held[at + 10:])
+    with pytest.raises(JournalCorrupt, match=FILE_NAME):
+        Journal(tmp_path)
+    assert recover_rows(path) == []

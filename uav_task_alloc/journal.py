@@ -7,10 +7,10 @@ import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from uav_task_alloc.atomic_files import sync_folder
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
@@ -21,6 +21,7 @@ VERSION = 1  # of the table layout; a file with a newer one is refused
 WAIT = 0.5  # [s] for the lock of another process
 _MIN_SIZE = 16  # [bytes] header of SQLite, which takes a shorter file for a new database
 _MAX_SIZE = 2**30  # [bytes] a corrupt header may declare any length
+_MEMORY = '/dev/shm'  # for a copy where no disk can be written to
 _COLUMNS = ['kind', 'id', 'body']
 # primary result codes of SQLite, and its texts for them: Python has the codes of errors
 # from 3.11 on
@@ -29,7 +30,11 @@ _IN_USE, _DAMAGED = frozenset({_BUSY, _LOCKED}), frozenset({_CORRUPT, _NOTADB})
 _TEXTS = {'database is locked': _BUSY, 'database table is locked': _LOCKED,
           'database disk image is malformed': _CORRUPT, 'malformed database schema': _CORRUPT,
           'file is not a database': _NOTADB}
+# a text of SQLite that quotes a corrupt file may be no UTF-8
+_FAILURES = (sqlite3.Error, OSError, UnicodeDecodeError)
 _SELECT = 'SELECT kind, id, body FROM world'
+
+_Result = TypeVar('_Result')
 
 
 class JournalRow(NamedTuple):
@@ -66,7 +71,7 @@ class Journal:
             self._db = _connect(self.path, wait)
             self._prepare()
             self._inode = self.path.stat().st_ino
-        except (sqlite3.Error, OSError) as error:
+        except _FAILURES as error:
             self.close()
             raise self._error('opened', error) from error
         except JournalError:
@@ -106,7 +111,7 @@ class Journal:
         """
         try:
             return [_row(*row) for row in self._db.execute(f'{_SELECT} ORDER BY kind, id')]
-        except sqlite3.Error as error:
+        except _FAILURES as error:
             raise self._error('read', error) from error
 
     def put(self, rows: Iterable[JournalRow]) -> None:
@@ -129,7 +134,7 @@ class Journal:
                     self._db.execute('INSERT OR REPLACE INTO world VALUES (?, ?, ?)',
                                      (row.kind, row.id, json.dumps(row.body)))
             self._db.execute('COMMIT')
-        except (sqlite3.Error, OSError) as error:
+        except _FAILURES as error:
             if self._db.in_transaction:
                 self._db.execute('ROLLBACK')
             raise self._error('written', error) from error
@@ -157,6 +162,8 @@ class Journal:
 
 def _primary_code(error: Exception) -> int:
     """The low byte of SQLite's result code; 0 for errors that are not of SQLite."""
+    if isinstance(error, UnicodeDecodeError):
+        return _CORRUPT
     if not isinstance(error, sqlite3.Error):
         return 0
     code = getattr(error, 'sqlite_errorcode', None)
@@ -255,18 +262,33 @@ def read_copy(state_dir: str) -> list[JournalRow]:
         state_dir: folder of the journal.
 
     Returns:
-        Its rows, from a temporary copy.
+        Its rows, from a temporary copy; none where there is no journal.
 
     Raises:
         JournalError: it cannot be copied or read.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        _copy(Path(state_dir).expanduser() / FILE_NAME, folder)
+    path = Path(state_dir).expanduser() / FILE_NAME
+    if all(_is_missing(Path(f'{path}{suffix}')) for suffix in _SUFFIXES[:2]):
+        return []
+
+    def read(folder: str) -> list[JournalRow]:
         journal = Journal(folder)
         try:
             return journal.load()
         finally:
             journal.close()
+
+    return _with_copy(path, read)
+
+
+def _is_missing(path: Path) -> bool:
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return True
+    except OSError:  # as where its folder may not be read
+        return False
+    return False
 
 
 def recover_rows(path: Path) -> list[JournalRow]:
@@ -281,17 +303,37 @@ def recover_rows(path: Path) -> list[JournalRow]:
     Raises:
         JournalError: it cannot be copied.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        _copy(path, folder)
+    found: dict[tuple[str, str], JournalRow] = {}
+
+    def read(folder: str) -> None:
         _pad(Path(folder, FILE_NAME))
         db = _connect(Path(folder, FILE_NAME))
-        found: dict[tuple[str, str], JournalRow] = {}
         try:
             for order in ('ASC', 'DESC'):
                 _read_on(db, f'{_SELECT} ORDER BY kind {order}, id {order}', found)
         finally:
             db.close()
+
+    _with_copy(path, read)
     return list(found.values())
+
+
+def _with_copy(path: Path, read: Callable[[str], _Result]) -> _Result:
+    """Call `read` with the folder of a temporary copy: on disk, else in memory.
+
+    Raises JournalError.
+    """
+    first_error: Exception | None = None
+    for parent in (None, _MEMORY):
+        try:
+            with tempfile.TemporaryDirectory(dir=parent) as folder:
+                _copy(path, folder)
+                return read(folder)
+        except JournalCorrupt:
+            raise
+        except (OSError, JournalError) as error:
+            first_error = first_error or error
+    raise JournalError(f'{path} cannot be copied: {first_error}') from first_error
 
 
 def _pad(path: Path) -> None:
@@ -310,7 +352,7 @@ def _read_on(db: Any, query: str, found: dict[tuple[str, str], JournalRow]) -> N
         for each in db.execute(query):
             row = _row(*each)
             found.setdefault((row.kind, row.id), row)
-    except sqlite3.Error:
+    except _FAILURES:
         return
 
 

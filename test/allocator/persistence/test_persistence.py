@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Disks that are full, read-only, damaged or removed: logged, survived, and written later."""
+import errno
 import os
 import shutil
 import sqlite3
 import subprocess
 import sys
+import tempfile
 
 import pytest
 from allocation import AllocatorDriver
 
+from uav_task_alloc import journal
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import SavedState
 from uav_task_alloc.errors import OriginMismatch
@@ -248,6 +251,55 @@ def test_finding_23_what_can_be_read_of_a_cut_journal_is_kept(disk):
     assert 'malformed; set aside as' in later.persistence.error
     later.add('t99')
     assert len(later.again()) == some + 1
+
+
+def test_what_can_be_read_of_a_damaged_journal_is_kept_where_no_new_one_can_be_created(
+        disk, monkeypatch):
+    disk.add(*(f't{k}' for k in range(50)))
+    disk.persistence.close()
+    held = (disk.folder / FILE_NAME).read_bytes()
+    (disk.folder / FILE_NAME).write_bytes(held[:-3 * 4096])
+    create = journal._create
+
+    def full(path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(journal, '_create', full)
+    later = Disk(disk.folder)
+    kept = {record.task.id for record in later.persistence.saved.tasks}
+    assert 0 < len(kept) < 50
+    assert 'No space left on device; tried again' in later.persistence.error
+    monkeypatch.setattr(journal, '_create', create)
+    later.add('t99')
+    assert later.again() == kept | {'t99'}
+
+
+def test_a_first_start_on_a_full_disk_loses_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, 'TemporaryDirectory', no_temporary_folder)
+    (tmp_path / 'state').touch()  # no folder can be created there
+    disk = Disk(tmp_path / 'state')
+    disk.add('t1')
+    assert len(disk.errors) == 1
+    (tmp_path / 'state').unlink()
+    disk.add('t2')
+    assert (disk.persistence.error, disk.again()) == ('', {'t1', 't2'})
+
+
+def no_temporary_folder(dir=None):
+    raise FileNotFoundError('No usable temporary directory found')
+
+
+def test_a_journal_is_read_where_no_temporary_folder_can_be_created(disk, unopenable,
+                                                                    monkeypatch):
+    disk.add('t1')
+    disk.persistence.close()
+    usual = tempfile.TemporaryDirectory
+    monkeypatch.setattr(tempfile, 'TemporaryDirectory', no_temporary_folder)
+    assert 'No usable temporary' in Disk(disk.folder).persistence.error
+    monkeypatch.setattr(tempfile, 'TemporaryDirectory',
+                        lambda dir=None: usual(dir=dir) if dir else no_temporary_folder())
+    later = Disk(disk.folder)
+    assert [record.task.id for record in later.persistence.saved.tasks] == ['t1']
 
 
 def test_finding_23_locked_in_the_path_is_tried_again(tmp_path):

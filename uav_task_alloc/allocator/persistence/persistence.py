@@ -66,6 +66,7 @@ class Persistence:
         self._has_origin = origin is None  # the journal names it
         self._present_error = ''
         self._lost = ''  # what could not be read at the start
+        self._recovered: list[JournalRow] = []  # of a damaged file that was set aside
         self._given_up = not state_dir
         self._retry = 0.0  # [s]
         self.in_use = ''
@@ -93,7 +94,7 @@ class Persistence:
         except JournalError as error:
             self._set_error(f'{error}; tried again every {_RETRY:g} s')
             try:
-                return self._checked(read_copy(self._dir))
+                return self._checked(self._recovered or read_copy(self._dir))
             except OriginMismatch:
                 raise
             except JournalError as worse:
@@ -131,6 +132,7 @@ class Persistence:
             rows = recover_rows(aside)
         except JournalError:
             rows = []
+        self._recovered = rows
         self._set_lost(f'{error}; set aside as {aside.name}, a new one is kept with the '
                        f'{len(rows)} rows that can be read')
         self._journal = Journal(self._dir)
