@@ -9,7 +9,7 @@ import yaml
 
 from uav_task_alloc import parameter_field, parameter_texts, params
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
+from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES, Objective
 
 ROOT = Path(__file__).parent.parent
 
@@ -74,3 +74,16 @@ def test_the_weights_of_an_objective_are_five_prices_or_none(weights):
     with pytest.raises(InvalidValue, match=r'objective_weights = .*: expected five numbers'):
         params.AllocatorParams(objective_weights=weights)
     params.AllocatorParams(objective_weights=(1, 0.5, 0, math.inf, math.inf))
+
+
+@pytest.mark.parametrize('value', [0.0, 5e-324, 1e9, 1.1e9, 1e300, math.inf])
+@pytest.mark.parametrize('place', range(5))
+def test_the_prices_that_the_parameter_takes_are_those_of_the_solver(place, value):
+    weights = tuple(value if each == place else 1.0 for each in range(5))
+    try:
+        Objective(*weights)
+    except InvalidValue:
+        with pytest.raises(InvalidValue, match=r'objective_weights = .*: expected five numbers'):
+            params.AllocatorParams(objective_weights=weights)
+    else:
+        assert params.AllocatorParams(objective_weights=weights).objective_weights == weights

@@ -2,12 +2,15 @@
 """All parameters, declared once; ROS descriptors, YAML files and docs are generated from them."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.parameter_field import CheckedParams, param
 
 MAX_RANGE = 1e7  # [m]
+_MAX_PRICE = 1e9  # of an objective
+_RULES = (3, 4)  # prices that may be infinite: lateness, unserved
 
 
 @dataclass(frozen=True)
@@ -102,11 +105,13 @@ class AllocatorParams(FrameParams):
 
     def __post_init__(self) -> None:
         FrameParams.__post_init__(self)
-        if len(self.objective_weights) not in (0, 5) or any(
-                not price >= 0.0 for price in self.objective_weights):
-            raise InvalidValue('objective_weights', list(self.objective_weights),
-                               'five numbers >= 0 (distance, finish, response, lateness, '
-                               'unserved), or none')
+        prices = self.objective_weights
+        if len(prices) not in (0, 5) or not all(
+                0.0 <= price <= _MAX_PRICE or (price == math.inf and number in _RULES)
+                for number, price in enumerate(prices)):
+            raise InvalidValue('objective_weights', list(prices),
+                               f'five numbers in [0, {_MAX_PRICE:g}] (distance, finish, response, '
+                               'lateness, unserved), the last two also .inf, or none')
         area = self.anticipate_area
         if area and not (len(area) == 4 and max(map(abs, area)) <= MAX_RANGE
                          and area[0] < area[2] and area[1] < area[3]):
