@@ -45,7 +45,7 @@ class Allocators:
                 if self.now - self.published[each.me.id] >= 1.0:
                     self.published[each.me.id] = self.now
                     for other in () if cut else self.leaders:
-                        other.update(each.me, each.role, self.now)
+                        other.update(each.me, each.reported, self.now)
 
     @property
     def leading(self):
@@ -86,6 +86,46 @@ def test_finding_22_the_present_leader_stays(fleet, started):
     assert late.error(fleet.now) == (
         'passive: another allocator leads this fleet: /b (instance b, started '
         '1970-01-01T00:00:00+00:00); this one publishes nothing until it is restarted')
+
+
+def restarted_unseen(fleet, started, id='r'):
+    """A restarted allocator that leads before it has discovered the others."""
+    late = Leader(AllocatorInstance(started, id, f'/{id}'), fleet.now, restarted=True)
+    late.tick(0, fleet.now + RESTART_DISCOVERY)
+    assert late.role is Role.LEADING
+    return late
+
+
+@pytest.mark.parametrize('started', [2, 0])  # 0: a computer whose clock is slow
+def test_the_present_leader_stays_where_a_restarted_one_discovers_it_late(fleet, started):
+    present = fleet.start(1, 'b')
+    fleet.run(5.0)
+    late = restarted_unseen(fleet, started)
+    now = fleet.now + DISCOVERY - STEP
+    present.update(late.me, late.reported, now)
+    late.update(present.me, present.reported, now)
+    assert (present.role, late.role) == (Role.LEADING, Role.PASSIVE)
+
+
+@pytest.mark.parametrize('reverse', [False, True])
+def test_of_two_restarted_that_discover_each_other_late_one_leads(fleet, reverse):
+    both = [restarted_unseen(fleet, started, id) for started, id in ((1, 'z'), (2, 'y'))]
+    now = fleet.now + DISCOVERY - STEP
+    for one, other in (both[::-1], both) if reverse else (both, both[::-1]):
+        one.update(other.me, Role.RESTARTING, now)
+    assert [each.role for each in both] == [Role.LEADING, Role.PASSIVE]
+
+
+def test_a_restarted_one_leads_a_new_one_and_reports_it_once_it_has_waited(fleet):
+    late = restarted_unseen(fleet, 2)
+    late.update(AllocatorInstance(1, 'new', '/new'), Role.STARTING, fleet.now + DISCOVERY)
+    late.tick(1, fleet.now + DISCOVERY)
+    assert late.reported is Role.RESTARTING
+    late.tick(0, fleet.now + DISCOVERY)
+    assert (late.reported, late.silent_others) == (Role.LEADING, False)
+    other = restarted_unseen(fleet, 3)
+    other.tick(1, fleet.now + STATUS_WAIT)
+    assert (other.reported, other.silent_others) == (Role.LEADING, True)
 
 
 @pytest.mark.parametrize('order', list(permutations([(1, 'b'), (2, 'a'), (2, 'c')])))

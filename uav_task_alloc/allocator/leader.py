@@ -25,8 +25,12 @@ class Role(Enum):
     """Role of an allocator in its fleet."""
 
     STARTING = 'starting'  # it waits for others, and publishes nothing yet
+    RESTARTING = 'restarting'  # it publishes, with the lists of its previous run, and waits
     LEADING = 'leading'
     PASSIVE = 'passive'  # another one leads; no inputs or outputs until a restart
+
+
+_RANKS = {Role.PASSIVE: 0, Role.STARTING: 1, Role.RESTARTING: 2, Role.LEADING: 3}
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -65,24 +69,32 @@ class Leader:
     def __init__(self, me: AllocatorInstance, now: float, restarted: bool = False) -> None:
         self.me, self.role, self.reason = me, Role.STARTING, ''
         self.silent_others = False
+        self._waits = True  # for the status of others
         self._earliest = now + (RESTART_DISCOVERY if restarted else DISCOVERY)
         self._discovered, self._latest = now + DISCOVERY, now + STATUS_WAIT
         self._leader_seen = now  # [s] last status of the leader, once passive
+
+    @property
+    def reported(self) -> Role:
+        """Its role for the others: it leads once it has waited for their status."""
+        return Role.RESTARTING if self.role is Role.LEADING and self._waits else self.role
 
     def update(self, other: AllocatorInstance, role: Role, now: float) -> None:
         """Apply the status of another allocator of this fleet."""
         if other.id == self.me.id or role is Role.PASSIVE:
             return
         if self.role is Role.PASSIVE:
-            self._leader_seen = now if role is Role.LEADING else self._leader_seen
+            self._leader_seen = self._leader_seen if role is Role.STARTING else now
         elif self._yields(other, role):
             self.refuse(f'another allocator leads this fleet: {other.text}', now)
 
     def _yields(self, other: AllocatorInstance, role: Role) -> bool:
-        """Whether the other one leads: the present leader, else the smaller instance."""
-        if self.role is not role:
-            return role is Role.LEADING
-        return other < self.me
+        """Whether the other one leads: the present leader, else the smaller instance.
+
+        Clocks of computers may differ: a leader never yields to one that has just started.
+        """
+        mine, others = _RANKS[self.reported], _RANKS[role]
+        return others > mine if others != mine else other < self.me
 
     def refuse(self, reason: str, now: float) -> None:
         """Become passive for a reason."""
@@ -99,11 +111,12 @@ class Leader:
         """
         if self.role is Role.LEADING and foreign and now < self._discovered:
             self.role = Role.STARTING
-        if self.role is not Role.STARTING or now < (
+        alone = others <= 0 or now >= self._latest
+        if self.role is Role.STARTING and alone and now >= (
                 self._discovered if foreign else self._earliest):
-            return
-        if others <= 0 or now >= self._latest:
             self.role, self.silent_others = Role.LEADING, others > 0
+        if self.role is Role.LEADING and self._waits and alone and now >= self._discovered:
+            self._waits, self.silent_others = False, others > 0
 
     def error(self, now: float) -> str:
         """Return why it is passive, for an operator; '' if it is not."""

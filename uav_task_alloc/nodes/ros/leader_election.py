@@ -65,11 +65,11 @@ class LeaderElection:
 
     def role(self) -> leader.Role:
         """The role of this allocator now."""
-        now, before = time.monotonic(), self.leader.role
-        if before is leader.Role.STARTING or (
+        now, before = time.monotonic(), self.leader.reported
+        if before in (leader.Role.STARTING, leader.Role.RESTARTING) or (
                 before is leader.Role.LEADING and self.lists.foreign):
             self.leader.tick(self._other_publishers(), now, self.lists.foreign)
-            if self.leader.role is not before and self.leader.silent_others:
+            if self.leader.reported is not before and self.leader.silent_others:
                 self.node.get_logger().warning(
                     f'{self.topic} has another publisher, which does not report what it is: '
                     'a replay, or an older allocator? Only one may lead a fleet')
@@ -81,4 +81,4 @@ class LeaderElection:
 
     def facts(self) -> dict[str, object]:
         """What other allocators have to know, for /diagnostics."""
-        return leader.status_values(self.leader.me, self.leader.role, self.topic)
+        return leader.status_values(self.leader.me, self.leader.reported, self.topic)
