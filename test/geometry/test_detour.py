@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Single zones against their closed forms, and special starts, goals and pockets."""
 import math
+from itertools import pairwise
 
 import pytest
 from dense import Dense
@@ -8,7 +9,7 @@ from scenes import violations
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import detour, find_detour
-from uav_task_alloc.geometry.zones import inside
+from uav_task_alloc.geometry.zones import inside, is_clear
 from uav_task_alloc.model import ThreatZone
 
 FENCE = [ThreatZone.cylinder(f'c{i}', (300 * math.cos(i * math.pi / 6),
@@ -159,6 +160,16 @@ def test_a_start_inside_two_zones_leaves_both():
     assert result.start_inside == ('a', 'b')
     assert math.dist((60, 0, 50), result.points[0]) == pytest.approx(80, rel=0.01)
     assert not any(inside(result.points[0], zone) for zone in zones)
+
+
+def test_the_way_out_of_a_clearance_is_not_through_the_zone():
+    above = ThreatZone.cylinder('above', (0.0, 0.0), 60.0, 55.0, 80.0)
+    below = ThreatZone.cylinder('below', (0.0, 0.0), 60.0, z_max=45.0)
+    start, goal = (0.0, 0.0, 50.0), (300.0, 0.0, 50.0)
+    found = find_detour(start, goal, (above, below), clearance=10.0)
+    assert math.isclose(found.length, 300.0, abs_tol=1.0)
+    for a, b in pairwise((start, *found.points, goal)):
+        assert is_clear(a, b, (above, below))
 
 
 def test_a_goal_inside_is_unreachable_and_reported():

@@ -45,10 +45,11 @@ def _depth(zone: Zone, x: float, y: float, z: float) -> float:
 
 
 @inner_allocating_kernel
-def _ray(zones: Zones, p: Floats, az: float, up: float, best: float, work: Ints) -> float:
+def _ray(zones: Zones, p: Floats, az: float, up: float, best: Floats, work: Ints) -> float:
     """Distance [m] along a ray at which the outside of all zones begins; inf: not before `best`.
 
-    Marches by the greatest depth, at most 400 steps of O(zones).
+    Where best[3] > 0 also inf if it leads deeper into a zone. Marches by the greatest depth, at
+    most 400 steps of O(zones).
     """
     c = math.cos(up)
     dx, dy, dz = math.cos(az) * c, math.sin(az) * c, math.sin(up)
@@ -60,12 +61,15 @@ def _ray(zones: Zones, p: Floats, az: float, up: float, best: float, work: Ints)
         for k in range(zones.size):
             zone = zones[k]
             d = _depth(zone, p[0] + t * dx, p[1] + t * dy, p[2] + t * dz)
+            if d > 0.0 and best[3] > 0.0 and d > zone.skin + max(
+                    0.0, _depth(zone, p[0], p[1], p[2])):
+                return np.inf
             if d > deepest:
                 deepest, least = d, 0.25 * zone.skin
         if deepest <= 0.0:
             return t
         t += max(deepest, least)
-        if t >= best:
+        if t >= best[0]:
             break
     return np.inf
 
@@ -73,10 +77,10 @@ def _ray(zones: Zones, p: Floats, az: float, up: float, best: float, work: Ints)
 @inner_allocating_kernel
 def _try_direction(zones: Zones, p: Floats, az: float, up: float, limits: Floats,
                    best: Floats, work: Ints) -> bool:
-    """Put the direction (az, up) [rad] into best (3,) = distance, az, up if it is nearer."""
+    """Put the direction (az, up) [rad] into best (4,) if it is nearer: see `escape_point`."""
     if work[2]:
         return False
-    t = _ray(zones, p, az, up, best[0], work)
+    t = _ray(zones, p, az, up, best, work)
     z = p[2] + t * math.sin(up)
     if t >= best[0] or not min(limits[0], p[2]) <= z <= max(limits[1], p[2]):
         return False
@@ -118,6 +122,8 @@ def escape_point(zones: Zones, p: Floats, limits: Floats, work: Ints) -> Floats:
     """The nearest point outside all zones on a ray from p, which is inside some.
 
     Tries 50 directions and those outwards of each zone, then refines the best by a pattern search.
+    A ray that leads deeper into a zone is taken only where there is no other: within the clearance
+    of a zone the way out is not through it.
 
     Args:
         p: float64 (3,) [m].
@@ -125,9 +131,12 @@ def escape_point(zones: Zones, p: Floats, limits: Floats, work: Ints) -> Floats:
     Returns:
         float64 (3,) [m]; NaN: there is none, or the search was cut short (work[2]).
     """
-    best, out = np.zeros(3), np.empty(3)
-    best[0] = np.inf
+    best, out = np.zeros(4), np.empty(3)  # distance, az, up, and 1 for no deeper ray
+    best[0], best[3] = np.inf, 1.0
     _initial_directions(zones, p, limits, best, work)
+    if math.isinf(best[0]):
+        best[3] = 0.0
+        _initial_directions(zones, p, limits, best, work)
     if math.isinf(best[0]):
         for m in range(3):
             out[m] = np.nan
