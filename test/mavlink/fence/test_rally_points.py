@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.fence.rally import choose_rally
+from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.nodes.conversions.bridge_parameters import to_rally_points
@@ -72,6 +73,17 @@ def test_a_rally_point_in_a_zone_is_taken_from_the_vehicle(kind):
     assert bench.run(lambda: len(bench.vehicle.mission.stores[RALLY]) == 1
                      and state.transfer.state is FenceState.VERIFIED)
     assert EAST.text in bench.fence.rally_text
+
+
+@BOTH
+def test_a_rally_point_outside_of_the_fence_area_is_not_used(kind):
+    area = FenceShape('', corners=((-100.0, -100.0), (300.0, -100.0), (300.0, 600.0),
+                                   (-100.0, 600.0)), inclusion=True)
+    bench = FenceBench(kind, zones=(), rally=(EAST, NORTH), fence_area=area).settle()
+    assert bench.run(lambda: bench.fence.rally.transfer.state is FenceState.VERIFIED)
+    assert bench.fence.rally.chosen == (NORTH,)
+    assert f'not used: {EAST.text}' in bench.fence.rally_text
+    assert len(bench.vehicle.mission.stores[RALLY]) == 1
 
 
 @BOTH

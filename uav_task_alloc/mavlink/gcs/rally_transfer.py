@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from uav_task_alloc.geometry.zones_on_path import zone_across_path
 from uav_task_alloc.mavlink.fence.onboard_fence import FenceState, OnboardFence
 from uav_task_alloc.mavlink.fence.rally import RallyPoint, choose_rally, rally_items
+from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.model import Point, ThreatZone
@@ -28,7 +29,7 @@ class RallyTransfer:
         self._chosen_for: object = None
 
     def choose(self, points: Sequence[RallyPoint], zones: Sequence[ThreatZone],
-               tasks: TaskList | None, home: Point) -> None:
+               tasks: TaskList | None, home: Point, area: FenceShape | None = None) -> None:
         """Choose the points for a list.
 
         Args:
@@ -36,14 +37,16 @@ class RallyTransfer:
             zones: that returns are not to cross.
             tasks: the list of the vehicle; None: none yet.
             home: of the vehicle [m] ENU.
+            area: that its fence keeps it in: no point outside of it is used; None: none.
         """
-        key = tuple(points), tuple(zones), tasks, home, self.transfer.budget
+        key = tuple(points), tuple(zones), tasks, home, area, self.transfer.budget
         if key == self._chosen_for:
             return
         self._chosen_for = key
         stops = () if tasks is None else tasks.stops
         path = [home, *(p for stop in stops for p in (*stop.via, *stop.way))]
-        self.chosen = choose_rally(points, path, home, lambda a, b: (
+        inside = [p for p in points if area is None or area.contains(p.position)]
+        self.chosen = choose_rally(inside, path, home, lambda a, b: (
             zone_across_path(a, b, zones) is not None))[:self.transfer.budget]
         self.left_out = tuple(point for point in points if point not in self.chosen)
         self.transfer.wanted = rally_items(self.chosen)

@@ -171,7 +171,8 @@ class VehicleFence:
     def _transfer_rally(self, now: float) -> list[Message]:
         policy, telemetry = self._policy(), self._telemetry
         if policy.zones_known and telemetry.home is not None:
-            self.rally.choose(policy.rally, policy.zones, self._onboard.tasks, telemetry.home)
+            self.rally.choose(policy.rally, policy.zones, self._onboard.tasks, telemetry.home,
+                              policy.fence_area if self.active else None)
         if not self._authority.allows(SendAction.READ):
             return []
         text = self.rally.text
