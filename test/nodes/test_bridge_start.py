@@ -46,6 +46,8 @@ def test_finding_13_a_corrupt_signing_timestamp_ends_the_start_with_a_reason(sta
     ('system_ids:=[300]', 'system_ids = 300.0: expected a number in [1, 255]'),
     ('uav_id_pattern:=one', "uav_id_pattern = 'one': expected a text with {sysid}"),
     ('uav_id_pattern:="{sysid}"', 'expected a ROS name'),
+    ('uav_id_pattern:="u{sysid[0]}"', "'u{sysid[0]}': expected a text with {sysid}"),
+    ('uav_id_pattern:="u{sysid.x}"', "'u{sysid.x}': expected a text with {sysid}"),
     ('signing_key_file:=/nowhere', "signing_key_file = '/nowhere': expected a readable file"),
     ('state_dir:=/dev/null/x', "state_dir = '/dev/null/x': expected a folder that can be writt"),
     ('relaunch:=never', "relaunch = 'never': expected one of operator, automatic"),

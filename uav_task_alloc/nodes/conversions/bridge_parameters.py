@@ -133,7 +133,7 @@ def to_gcs_config(params: BridgeParams) -> GcsConfig:
     """
     try:
         names = {params.uav_id_pattern.format(sysid=number) for number in (1, 2)}
-    except (KeyError, IndexError, ValueError):
+    except (LookupError, ValueError, TypeError, AttributeError):
         names = set()
     if len(names) != 2:
         raise InvalidValue('uav_id_pattern', params.uav_id_pattern, 'a text with {sysid}')
