@@ -239,3 +239,15 @@ def test_a_damage_that_sqlite_quotes_in_its_error_is_a_damage(tmp_path):
     with pytest.raises(JournalCorrupt, match=FILE_NAME):
         Journal(tmp_path)
     assert recover_rows(path) == []
+
+
+def test_rows_that_zeros_on_disk_hide_are_a_damage_not_an_empty_journal(tmp_path):
+    journal = Journal(tmp_path)
+    journal.put([JournalRow('a', str(k), k) for k in range(20)])
+    journal.close()
+    path = tmp_path / FILE_NAME
+    held = bytearray(path.read_bytes())
+    held[4096 + 3:4096 + 5] = bytes(2)  # the number of rows in the header of their page
+    path.write_bytes(held)
+    with pytest.raises(JournalCorrupt, match='malformed'):
+        Journal(tmp_path)

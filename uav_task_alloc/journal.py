@@ -87,6 +87,9 @@ class Journal:
             raise JournalForeign(f'{self.path}: layout version = {version}: expected at most '
                                  f'{VERSION}, a newer uav_task_alloc wrote it')
         self._check_layout(version)
+        # zeros in the header of a page make SQLite find no rows there, without an error
+        if self._db.execute('PRAGMA quick_check(1)').fetchone()[0] != b'ok':
+            raise JournalCorrupt(f'{self.path}: database disk image is malformed')
         self._db.execute('BEGIN IMMEDIATE')  # fails unless the lock is ours
         self._db.execute('COMMIT')
 
