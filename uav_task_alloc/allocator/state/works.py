@@ -219,6 +219,8 @@ class Works:
     def flown_after_all(self, task_id: str, uav_id: str, stamp: float) -> bool:
         """Count the way of a replaced piece as flown; the rest is cut without it.
 
+        Work that is CANCELLED stays so.
+
         Args:
             task_id: of the replaced piece.
             uav_id: that has flown it.
@@ -230,11 +232,13 @@ class Works:
         if not unflown_parts(task.path, [record.task.path for record in self._present(known)
                                          if record.state is TaskState.COMPLETED]):
             return False
-        last = known.last + 1
+        withdrawn, last = self.state(known) is TaskState.CANCELLED, known.last + 1
         self._tasks.add(replace(task, id=piece_id(known.id, last)), stamp)
         self._tasks.step(piece_id(known.id, last), TaskTransition.COMPLETE, stamp, uav_id)
-        self._recut_one(replace(known, pieces=(*known.pieces, piece_id(known.id, last)),
-                                last=last), stamp, 'flown as it was cut before')
+        known = replace(known, pieces=(*known.pieces, piece_id(known.id, last)), last=last)
+        self._put(known)
+        if not withdrawn:
+            self._recut_one(known, stamp, 'flown as it was cut before')
         return True
 
     # questions
