@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is left of ways when parts of them are flown already: collinear parts are taken out."""
+"""Ways that are cut again: their direction, and what is left where collinear parts are flown."""
 from __future__ import annotations
 
 import math
@@ -15,6 +15,7 @@ from uav_task_alloc.geometry.polyline import (
 from uav_task_alloc.model import Point
 
 _BESIDE = 0.5  # [m] that a flown way may be beside another one and count for it
+_ALIKE = math.pi / 3000  # [rad] directions of segments that differ by less are one
 _SHORTEST = 0.5  # [m] a shorter rest is not flown
 
 
@@ -29,6 +30,27 @@ def way_key(way: Sequence[Point]) -> tuple[Point, ...]:
     """
     rounded = tuple((round(x, 2), round(y, 2), round(z, 2)) for x, y, z in way)
     return min(rounded, rounded[::-1])
+
+
+def main_direction(ways: Iterable[Sequence[Point]]) -> float:
+    """Return the direction in which the most of ways leads, as that of strips.
+
+    A way along a zone, or the rest of one, may begin across its strip.
+
+    Args:
+        ways: [m] ENU, at least one.
+
+    Returns:
+        [rad] in [0, pi), counter-clockwise from east, of the longest segment in that direction.
+    """
+    totals: dict[int, float] = {}
+    longest: dict[int, tuple[float, float]] = {}  # length [m], angle [rad]
+    for (ax, ay, _), (bx, by, _) in (pair for way in ways for pair in pairwise(way)):
+        length, angle = math.hypot(bx - ax, by - ay), math.atan2(by - ay, bx - ax) % math.pi
+        alike = round(angle / _ALIKE) % round(math.pi / _ALIKE)
+        totals[alike] = totals.get(alike, 0.0) + length
+        longest[alike] = max(longest.get(alike, (0.0, 0.0)), (length, angle))
+    return longest[max(totals, key=totals.__getitem__)][1]
 
 
 def unflown_parts(way: Sequence[Point],

@@ -6,7 +6,6 @@ of the pieces that are COMPLETED.
 """
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
@@ -20,7 +19,7 @@ from uav_task_alloc.model import Point, Task
 from uav_task_alloc.piece_ids import piece_id, split_piece
 from uav_task_alloc.terrain import TerrainError
 from uav_task_alloc.work.pieces import Work
-from uav_task_alloc.work.recut import unflown_parts, way_key
+from uav_task_alloc.work.recut import main_direction, unflown_parts, way_key
 from uav_task_alloc.work.values import Kind
 
 # the state of the whole is the first of these that an open piece has
@@ -162,14 +161,11 @@ class Works:
         return self._recut(known, pieces, stamp, why)
 
     def _as_cut(self, known: WorkRecord) -> Work:
-        """The work with the direction that its strips have, the flown ones first."""
-        work = known.work
-        paths = [record.task.path for record in sorted(
-            self._present(known), key=lambda each: each.state is not TaskState.COMPLETED)]
+        """The work with the direction that its strips have."""
+        work, paths = known.work, [record.task.path for record in self._present(known)]
         if work.kind is not Kind.AREA or work.direction is not None or not paths:
             return work
-        (ax, ay, _), (bx, by, _) = paths[0][:2]
-        return replace(work, direction=math.atan2(by - ay, bx - ax) % math.pi)
+        return replace(work, direction=main_direction(paths))
 
     def _recut(self, known: WorkRecord, pieces: Sequence[Task], stamp: float, why: str,
                renew: bool = False) -> bool:
