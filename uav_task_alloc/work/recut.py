@@ -14,22 +14,25 @@ from uav_task_alloc.geometry.polyline import (
 )
 from uav_task_alloc.model import Point
 
+_Shares = tuple[float, float]  # of a segment, from and to
+_Segment = tuple[Point, Point]  # [m]
 _BESIDE = 0.5  # [m] that a flown way may be beside another one and count for it
 _ALIKE = math.pi / 3000  # [rad] directions of segments that differ by less are one
 _SHORTEST = 0.5  # [m] a shorter rest is not flown
 
 
-def way_key(way: Sequence[Point]) -> tuple[Point, ...]:
-    """Return the same value for ways through the same points, in either direction.
+def way_key(way: Sequence[Point], reversible: bool) -> tuple[Point, ...]:
+    """Return the same value for ways through the same points.
 
     Args:
         way: [m] ENU.
+        reversible: the same in either direction.
 
     Returns:
         Points rounded to 1 cm.
     """
     rounded = tuple((round(x, 2), round(y, 2), round(z, 2)) for x, y, z in way)
-    return min(rounded, rounded[::-1])
+    return min(rounded, rounded[::-1]) if reversible else rounded
 
 
 def main_direction(ways: Iterable[Sequence[Point]]) -> float:
@@ -53,33 +56,46 @@ def main_direction(ways: Iterable[Sequence[Point]]) -> float:
     return longest[max(totals, key=totals.__getitem__)][1]
 
 
-def unflown_parts(way: Sequence[Point],
-                  flown: Iterable[Sequence[Point]]) -> list[tuple[Point, ...]]:
-    """Return the parts of a way along which none of the flown ways leads.
+class FlownWays:
+    """Ways that are flown, each of which counts once: a place may have to be passed several times.
 
     Args:
-        way: [m] ENU, at least two points.
-        flown: ways that are flown [m] ENU; those that only cross `way` do not count.
-
-    Returns:
-        [m] in the order of `way`, each of at least 0.5 m; `way` itself where none of it is flown.
+        ways: [m] ENU.
     """
-    segments = [pair for each in flown if _near(way, each) for pair in pairwise(each)]
-    if not segments:
-        return [tuple(way)]
-    parts: list[list[Point]] = []
-    open_end = False  # the last part goes on
-    for a, b in pairwise(way):
-        rest = _rest([span for c, d in segments if (span := _overlap(a, b, c, d))])
-        open_end &= bool(rest)
-        for low, high in rest:
-            start, end = _at(a, b, low), _at(a, b, high)
-            if low == 0.0 and open_end:
-                parts[-1].append(end)
-            else:
-                parts.append([start, end])
-            open_end = high == 1.0
-    return [tuple(part) for part in parts if polyline_length(part) >= _SHORTEST]
+
+    def __init__(self, ways: Iterable[Sequence[Point]]) -> None:
+        self._ways = [(tuple(way), list(pairwise(way))) for way in ways]
+
+    def unflown_parts(self, way: Sequence[Point]) -> list[tuple[Point, ...]]:
+        """Return the parts of a way along which none of the flown ways leads.
+
+        What counts for this way counts for no later one.
+
+        Args:
+            way: [m] ENU, at least two points; flown ways that only cross it do not count.
+
+        Returns:
+            [m] in the order of `way`, each of at least 0.5 m; `way` itself where none of it is
+            flown.
+        """
+        near = [segments for each, segments in self._ways if _near(way, each)]
+        if not near:
+            return [tuple(way)]
+        parts: list[list[Point]] = []
+        open_end = False  # the last part goes on
+        for a, b in pairwise(way):
+            rest = [(0.0, 1.0)]
+            for segments in near:
+                rest = _without_flown(a, b, rest, segments)
+            open_end &= bool(rest)
+            for low, high in rest:
+                start, end = _at(a, b, low), _at(a, b, high)
+                if low == 0.0 and open_end:
+                    parts[-1].append(end)
+                else:
+                    parts.append([start, end])
+                open_end = high == 1.0
+        return [tuple(part) for part in parts if polyline_length(part) >= _SHORTEST]
 
 
 def _near(way: Sequence[Point], other: Sequence[Point]) -> bool:
@@ -89,7 +105,24 @@ def _near(way: Sequence[Point], other: Sequence[Point]) -> bool:
                for k in range(3))
 
 
-def _overlap(a: Point, b: Point, c: Point, d: Point) -> tuple[float, float] | None:
+def _without_flown(a: Point, b: Point, rest: list[_Shares],
+                   segments: list[_Segment]) -> list[_Shares]:
+    """What flown segments leave of parts of ab; what they count for is taken out of them."""
+    flown, segments[:] = segments[:], []
+    for c, d in flown:
+        start, end = _overlap(a, b, c, d) or (1.0, 0.0)
+        used = [span for low, high in rest if (span := (max(low, start), min(high, end)))[0]
+                < span[1]]
+        if used:
+            rest = [(s, t) for low, high in rest
+                    for s, t in ((low, min(high, start)), (max(low, end), high)) if s < t]
+        shares = [sorted(segment_fraction(_at(a, b, share), c, d) for share in span)
+                  for span in used]
+        segments += [(_at(c, d, s), _at(c, d, t)) for s, t in _rest([(s, t) for s, t in shares])]
+    return rest
+
+
+def _overlap(a: Point, b: Point, c: Point, d: Point) -> _Shares | None:
     """The part of the segment ab, as fractions, along which cd leads beside it."""
     ends = segment_fraction(c, a, b), segment_fraction(d, a, b)
     low, high = max(0.0, min(ends)), min(1.0, max(ends))
@@ -99,7 +132,7 @@ def _overlap(a: Point, b: Point, c: Point, d: Point) -> tuple[float, float] | No
     return low, high
 
 
-def _rest(spans: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def _rest(spans: list[_Shares]) -> list[_Shares]:
     """What spans leave of 0..1."""
     left, at = [], 0.0
     for low, high in sorted(spans):

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Work that is cut again in flight: what was withdrawn or flown stays so, and nothing is lost."""
+import math
 from dataclasses import replace
 
 import pytest
 from test_works import FIELD, fleet, fly, route, status
 
+from uav_task_alloc.allocator.records import AnnouncementAction
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import ThreatZone
-from uav_task_alloc.work.recut import main_direction
+from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.work.pieces import Work, pieces_of
+from uav_task_alloc.work.recut import FlownWays, main_direction
+from uav_task_alloc.work.values import Kind
 
 
 def test_work_that_was_cancelled_stays_so_when_a_piece_of_an_earlier_cut_is_flown():
@@ -64,6 +68,62 @@ def test_strips_keep_their_direction_after_a_part_across_them_is_flown():
         for each in (*route(driver, 'a'), *route(driver, 'b')):
             a, b = driver.world.tasks.records[each].task.path[:2]
             assert a[1] == pytest.approx(b[1])
+
+
+def orbit(turns):
+    return Work(Task('mast', (0.0, 200.0, 50.0)), Kind.ORBIT, radius=50.0, turns=turns)
+
+
+def open_length(driver, task_id):
+    return sum(driver.world.tasks.records[each].task.path_length
+               for each in driver.world.works.open_pieces(task_id))
+
+
+def test_each_turn_of_an_orbit_is_flown_when_it_is_cut_again():
+    driver, beside = fleet(), ThreatZone.cylinder('z', (50.0, 200.0), 15.0)
+    driver.add(orbit(3.0))
+    driver.world.set_zones([beside], (), driver.now)
+    driver.settle()
+    cut = driver.world.works.records['mast'].pieces
+    assert len(set(cut)) == 3
+    a_turn = driver.world.tasks.records[cut[0]].task.path_length
+    uav_id = next(each for each in 'ab' if cut[0] in route(driver, each))
+    fly(driver, uav_id)
+    driver.world.set_zones([replace(beside, margin=1.0)], (), driver.now)
+    driver.settle()
+    assert 1.9 * a_turn < open_length(driver, 'mast') < 2.1 * a_turn
+    driver.world.set_zones([], (), driver.now)
+    driver.settle()
+    around = 2 * math.pi * 50.0
+    assert open_length(driver, 'mast') == pytest.approx(3 * around - a_turn, rel=0.01)
+
+
+def test_a_line_that_leads_there_and_back_keeps_all_of_its_pieces():
+    driver = fleet()
+    points = [(x, 0.0, 50.0) for x in (100.0, 200.0, 300.0, 200.0, 100.0)]
+    driver.add(Work(Task('cable', points[0]), Kind.LINE, points, divisible=True))
+    driver.settle()
+    driver.world.set_zones([ThreatZone.cylinder('z', (900.0, 0.0), 15.0)], (), driver.now)
+    driver.settle()
+    assert set(driver.world.works.records['cable'].pieces) == {f'cable#{k}' for k in range(1, 5)}
+    assert open_length(driver, 'cable') == pytest.approx(400.0)
+
+
+def test_an_update_turns_an_orbit_the_other_way_round():
+    driver = fleet()
+    driver.add(orbit(1.0))
+    assert driver.add(orbit(-1.0), action=AnnouncementAction.UPDATE)[0].accepted
+    driver.settle()
+    task_id, = driver.world.works.open_pieces('mast')
+    assert driver.world.tasks.records[task_id].task.path == pieces_of(orbit(-1.0))[0].path
+
+
+def test_a_flown_way_counts_once():
+    way = ((0.0, 0.0, 50.0), (100.0, 0.0, 50.0))
+    flown = FlownWays([((70.0, 0.0, 50.0), (20.0, 0.0, 50.0)), ((50.0, 0.0, 50.0), way[1])])
+    assert flown.unflown_parts(way) == [(way[0], (20.0, 0.0, 50.0))]
+    assert flown.unflown_parts(way) == [(way[0], (50.0, 0.0, 50.0)), ((70.0, 0.0, 50.0), way[1])]
+    assert flown.unflown_parts(way) == [way]
 
 
 def test_the_direction_of_ways_is_that_of_most_of_their_length():

@@ -12,7 +12,7 @@ from uav_task_alloc.allocator.state.stop_times import way_ahead
 from uav_task_alloc.allocator.status import health_values, status_of_work
 from uav_task_alloc.model import Leg, Task, ThreatZone
 from uav_task_alloc.work.pieces import Work
-from uav_task_alloc.work.recut import unflown_parts
+from uav_task_alloc.work.recut import FlownWays
 from uav_task_alloc.work.values import Kind
 
 # six strips from west to east, 20 m apart, of 200 m each
@@ -67,6 +67,10 @@ def fly(driver, uav_id, count=1):
         ways.append(stop.way)
         driver.settle(report=False)
     return ways
+
+
+def unflown_parts(way, flown):
+    return FlownWays(flown).unflown_parts(way)
 
 
 def test_an_area_is_flown_in_strips_by_all_uavs_and_done_when_all_are():

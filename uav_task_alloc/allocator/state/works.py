@@ -19,7 +19,7 @@ from uav_task_alloc.model import Point, Task
 from uav_task_alloc.piece_ids import piece_id, split_piece
 from uav_task_alloc.terrain import TerrainError
 from uav_task_alloc.work.pieces import Work
-from uav_task_alloc.work.recut import main_direction, unflown_parts, way_key
+from uav_task_alloc.work.recut import FlownWays, main_direction, way_key
 from uav_task_alloc.work.values import Kind
 
 # the state of the whole is the first of these that an open piece has
@@ -171,21 +171,24 @@ class Works:
                renew: bool = False) -> bool:
         """Take over a new cut: equal pieces keep their ids, and what is flown is left out."""
         present = {record.task.id: record for record in self._present(known)}
-        by_way = {way_key(record.task.path): task_id for task_id, record in present.items()}
-        flown = [record.task.path for record in present.values()
-                 if record.state is TaskState.COMPLETED]
+        by_way = _ids_by_way(present.values())
+        done = [_same_flown(by_way, piece, present) for piece in pieces]
+        flown = FlownWays(record.task.path for record in present.values()
+                          if record.state is TaskState.COMPLETED and record.task.id not in done)
         kept, last, changed = list[str](), known.last, False
-        for piece in pieces:
-            whole = present.get(by_way.get(way_key(piece.path), ''))
-            done = whole is not None and whole.state is TaskState.COMPLETED
-            for part in [piece] if done else _parts(piece, flown):
-                same = by_way.get(way_key(part.path))
-                if same is None:
+        for piece, whole in zip(pieces, done, strict=True):
+            if whole:
+                kept.append(whole)
+                continue
+            for part in _parts(piece, flown):
+                if alike := by_way.get(way_key(part.path, part.reversible)):
+                    same = alike.pop(0)
+                    if renew and present[same].state is not TaskState.COMPLETED:
+                        changed |= self._renew(present[same], part, stamp)
+                else:
                     last, changed = last + 1, True
                     same = piece_id(known.id, last)
                     self._tasks.add(replace(part, id=same), stamp)
-                elif renew and present[same].state is not TaskState.COMPLETED:
-                    changed |= self._renew(present[same], part, stamp)
                 kept.append(same)
         ended = [each for each in known.pieces if each in present and each not in kept
                 and present[each].state is TaskState.COMPLETED]
@@ -225,8 +228,8 @@ class Works:
             Whether any of it was not flown before.
         """
         known, task = self.records[split_piece(task_id)[0]], self._tasks.records[task_id].task
-        if not unflown_parts(task.path, [record.task.path for record in self._present(known)
-                                         if record.state is TaskState.COMPLETED]):
+        if not FlownWays(record.task.path for record in self._present(known)
+                         if record.state is TaskState.COMPLETED).unflown_parts(task.path):
             return False
         withdrawn, last = self.state(known) is TaskState.CANCELLED, known.last + 1
         self._tasks.add(replace(task, id=piece_id(known.id, last)), stamp)
@@ -326,9 +329,27 @@ class Works:
         self.unsaved.add(record.id)
 
 
-def _parts(piece: Task, flown: Sequence[Sequence[Point]]) -> list[Task]:
+def _ids_by_way(records: Iterable[TaskRecord]) -> dict[tuple[Point, ...], list[str]]:
+    """Ids of pieces by their ways, the flown ones first."""
+    found = dict[tuple[Point, ...], list[str]]()
+    for record in sorted(records, key=lambda each: each.state is not TaskState.COMPLETED):
+        found.setdefault(way_key(record.task.path, record.task.reversible), []).append(
+            record.task.id)
+    return found
+
+
+def _same_flown(by_way: dict[tuple[Point, ...], list[str]], piece: Task,
+                present: dict[str, TaskRecord]) -> str:
+    """A flown piece with the way of another one, taken out of `by_way`; '' for none."""
+    alike = by_way.get(way_key(piece.path, piece.reversible))
+    if not alike or present[alike[0]].state is not TaskState.COMPLETED:
+        return ''
+    return alike.pop(0)
+
+
+def _parts(piece: Task, flown: FlownWays) -> list[Task]:
     """A piece of a new cut, or what is not flown of it, with its share of the value."""
-    ways = unflown_parts(piece.path, flown)
+    ways = flown.unflown_parts(piece.path)
     if ways == [piece.path]:
         return [piece]
     length = piece.path_length
