@@ -2,12 +2,17 @@
 """Work whose heights are above the ground: its points and ways in the ENU frame."""
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
-from uav_task_alloc.model import Point, Task
+from uav_task_alloc.model import Point, Shape, Task, ThreatZone
 from uav_task_alloc.terrain import Terrain
 from uav_task_alloc.work.values import Geometry
+from uav_task_alloc.work.zone_sections import free_parts
 
+_ALL = 0.999  # share of the ways over a zone that is inside of it where it bars all of them
 _TOLERANCE = 0.1, 2.0  # share of the height above ground, and at least [m], that ways may be off
 
 
@@ -46,3 +51,35 @@ def following_ways(given: Geometry, ways: list[tuple[Point, ...]],
     lowest = min(z for way in ways for _, _, z in way)
     share, least = _TOLERANCE
     return [terrain.followed(way, max(least, share * lowest)) for way in ways]
+
+
+def barring_zones(ways: Iterable[Sequence[Point]], zones: Iterable[ThreatZone],
+                  clearance: float) -> dict[str, ThreatZone]:
+    """Zones that no way leads over or below: strips can be cut around them in plan view.
+
+    Args:
+        ways: [m] ENU, that follow the ground and may enter zones.
+        zones: each is enlarged by its margin and `clearance`.
+        clearance: [m].
+
+    Returns:
+        Such zones without limits of height, by id; no hemispheres, which are as wide as they are
+        at the height of a way.
+    """
+    legs = [pair for way in ways for pair in pairwise(way)]
+    found = {}
+    for zone in zones:
+        if zone.shape is Shape.HEMISPHERE:
+            continue
+        endless = replace(zone, z_min=-math.inf, z_max=math.inf)
+        most = _length_inside(legs, endless, clearance)
+        if most > 0.0 and _length_inside(legs, zone, clearance) >= _ALL * most:
+            found[zone.id] = endless
+    return found
+
+
+def _length_inside(legs: Iterable[tuple[Point, Point]], zone: ThreatZone,
+                   clearance: float) -> float:
+    """Length [m] of the parts of legs that are inside a zone."""
+    return math.fsum(math.dist(a, b) * (1.0 - math.fsum(
+        end - start for start, end in free_parts(a, b, (zone,), clearance))) for a, b in legs)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.terrain import Terrain
-from uav_task_alloc.work.above_ground import above_ground_task, following_ways
+from uav_task_alloc.work.above_ground import above_ground_task, barring_zones, following_ways
 from uav_task_alloc.work.area import area_ways, check_area
 from uav_task_alloc.work.line import check_line, free_ways, line_ways
 from uav_task_alloc.work.orbit import check_orbit, looks_at_centre, orbit_ways
@@ -87,7 +87,21 @@ def pieces_of(work: Work, zones: Sequence[ThreatZone] = (), clearance: float = 0
     if ground is None:
         ways = rules.ways(work, zones, clearance) or rules.ways(work, (), clearance)
     else:
-        ways = following_ways(work, rules.ways(work, (), clearance), ground)
-        ways = [part for way in ways for part in free_ways(way, zones, clearance)] or ways
+        ways = _ways_over(work, zones, clearance, ground)
         work = replace(work, task=above_ground_task(work, ground))
     return tuple(rules.finish(work, piece) for piece in piece_tasks(work, ways, rules.reversible))
+
+
+def _ways_over(work: Work, zones: Sequence[ThreatZone], clearance: float,
+               ground: Terrain) -> Ways:
+    """Ways that follow the ground outside of zones, or as if there were none."""
+    cut = KINDS[work.kind].ways
+    through = following_ways(work, cut(work, (), clearance), ground)
+    ways, barring = through, dict[str, ThreatZone]()
+    if work.kind is Kind.AREA:
+        barring = barring_zones(through, zones, clearance)
+    if barring:
+        around = cut(work, tuple(barring.values()), clearance)
+        ways = following_ways(work, around, ground) if around else []
+    others = [zone for zone in zones if zone.id not in barring]
+    return [part for way in ways for part in free_ways(way, others, clearance)] or through
