@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
 from uav_task_alloc.checks import check_number, check_polygon
 from uav_task_alloc.errors import InvalidValue
@@ -16,7 +18,34 @@ from uav_task_alloc.work.values import Geometry, refuse_unused
 from uav_task_alloc.work.zone_sections import sections
 
 _USED = 'path', 'holes', 'strip_width', 'direction'
+_SAME = 0.5  # [m] that a flown way may be above or below an area, and count for it
 _LEVEL = 10.0  # [m] by which the heights of corners may differ: the earth curves
+
+
+@dataclass(frozen=True, slots=True)
+class FlownStrips:
+    """Ways that are flown over an area, and how wide each of them has covered it."""
+
+    ways: tuple[tuple[tuple[Point, ...], float], ...] = ()  # [m] ENU, [m]
+
+    def rings(self, height: float) -> list[list[XY]]:
+        """What those at a height have covered: a rectangle [m] around each leg.
+
+        Args:
+            height: [m] of the area.
+        """
+        found: list[list[XY]] = []
+        for width, (ax, ay, az), (bx, by, bz) in (
+                (width, *leg) for way, width in self.ways for leg in pairwise(way)):
+            length = math.hypot(bx - ax, by - ay)
+            if length > 0.0 and abs(az - height) <= _SAME and abs(bz - height) <= _SAME:
+                x, y = 0.5 * width * (ay - by) / length, 0.5 * width * (bx - ax) / length
+                found.append([(ax - x, ay - y), (bx - x, by - y), (bx + x, by + y),
+                              (ax + x, ay + y)])
+        return found
+
+
+NOTHING_FLOWN = FlownStrips()
 
 
 def check_area(given: Geometry) -> None:
@@ -48,17 +77,18 @@ def _within(hole: Sequence[XY], outer: Sequence[XY]) -> bool:
     ) and not any(segments_cross(a, b, c, d) for a, b in edges(hole) for c, d in edges(outer))
 
 
-def area_ways(given: Geometry, zones: Sequence[ThreatZone],
-              clearance: float) -> list[tuple[Point, ...]]:
+def area_ways(given: Geometry, zones: Sequence[ThreatZone], clearance: float,
+              flown: FlownStrips = NOTHING_FLOWN) -> list[tuple[Point, ...]]:
     """Cut an AREA into strips.
 
     Args:
         given: checked.
         zones: are holes as well; each is enlarged by its margin and `clearance`.
         clearance: [m].
+        flown: what it has covered is left out.
 
     Returns:
-        [m], z as that of the path; none where zones cover all of it.
+        [m], z as that of the path; none where zones and what is flown cover all of it.
 
     Raises:
         InvalidValue: there would be too many strips.
@@ -70,6 +100,7 @@ def area_ways(given: Geometry, zones: Sequence[ThreatZone],
         return [(point[0] - x0, point[1] - y0) for point in points]
 
     region = Region(near(given.path), tuple(near(hole) for hole in given.holes), tuple(
-        near(ring) for ring in sections(zones, height, height, clearance)))
+        near(ring) for ring in sections(zones, height, height, clearance)),
+        tuple(near(ring) for ring in flown.rings(height)))
     ways = cover(region, given.strip_width, given.direction, given.place('strip_width'))
     return [tuple((x + x0, y + y0, height) for x, y in way) for way in ways]

@@ -18,21 +18,26 @@ _THIN = 1e-7  # [m] slabs that are thinner have no cells
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A polygon without holes and without barred rings, where no UAV may fly."""
+    """A polygon without holes, without what is covered, and without barred rings.
+
+    No UAV may fly in a barred ring.
+    """
 
     outer: PlaneRing
     holes: tuple[PlaneRing, ...] = ()
     barred: tuple[PlaneRing, ...] = ()
+    covered: tuple[PlaneRing, ...] = ()
 
     @property
     def rings(self) -> tuple[PlaneRing, ...]:
         """All rings, the outer one first."""
-        return (self.outer, *self.holes, *self.barred)
+        return (self.outer, *self.holes, *self.barred, *self.covered)
 
     def turned(self, angle: float) -> Region:
         """The region turned around (0, 0) by an angle [rad]."""
-        return Region(turn(self.outer, angle), tuple(turn(ring, angle) for ring in self.holes),
-                      tuple(turn(ring, angle) for ring in self.barred))
+        return Region(turn(self.outer, angle), *(
+            tuple(turn(ring, angle) for ring in rings)
+            for rings in (self.holes, self.barred, self.covered)))
 
 
 def turn(points: Iterable[XY], angle: float) -> list[XY]:

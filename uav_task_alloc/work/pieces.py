@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.terrain import Terrain
 from uav_task_alloc.work.above_ground import above_ground_task, barring_zones, following_ways
-from uav_task_alloc.work.area import area_ways, check_area
+from uav_task_alloc.work.area import NOTHING_FLOWN, FlownStrips, area_ways, check_area
 from uav_task_alloc.work.line import check_line, free_ways, line_ways
 from uav_task_alloc.work.orbit import check_orbit, looks_at_centre, orbit_ways
 from uav_task_alloc.work.values import (
@@ -56,7 +57,8 @@ class Work(Geometry):
 
 
 def pieces_of(work: Work, zones: Sequence[ThreatZone] = (), clearance: float = 0.0,
-              terrain: Terrain | None = None) -> tuple[Task, ...]:
+              terrain: Terrain | None = None,
+              flown: FlownStrips = NOTHING_FLOWN) -> tuple[Task, ...]:
     """Cut work into tasks, each of which one UAV flies as a whole.
 
     Parts inside zones are left out. Where zones cover all of it, it is cut as if there were none:
@@ -67,11 +69,12 @@ def pieces_of(work: Work, zones: Sequence[ThreatZone] = (), clearance: float = 0
         zones: in force; each is enlarged by its margin and `clearance`.
         clearance: [m].
         terrain: the ground, for work whose heights are above it.
+        flown: of an AREA whose heights are those of the ENU frame: it is left out.
 
     Returns:
-        Of a POINT the task; otherwise tasks with a `path` and ids `<task id>#<k>`, k from 1, with
-        their share of value and service time by length, and all else as the task has it. The
-        same for the same arguments.
+        Of a POINT the task; of an AREA of which all is flown none; otherwise tasks with a `path`
+        and ids `<task id>#<k>`, k from 1, with their share of value and service time by length,
+        and all else as the task has it. The same for the same arguments.
 
     Raises:
         InvalidValue: there would be too many pieces, or heights are above a ground that is not
@@ -85,7 +88,8 @@ def pieces_of(work: Work, zones: Sequence[ThreatZone] = (), clearance: float = 0
         return (work.task if ground is None else above_ground_task(work, ground),)
     rules = KINDS[work.kind]
     if ground is None:
-        ways = rules.ways(work, zones, clearance) or rules.ways(work, (), clearance)
+        cut = partial(area_ways, flown=flown) if work.kind is Kind.AREA else rules.ways
+        ways = cut(work, zones, clearance) or cut(work, (), clearance)
     else:
         ways = _ways_over(work, zones, clearance, ground)
         work = replace(work, task=above_ground_task(work, ground))

@@ -97,6 +97,10 @@ class FlownWays:
                 open_end = high == 1.0
         return [tuple(part) for part in parts if polyline_length(part) >= _SHORTEST]
 
+    def length_left(self) -> float:
+        """Return the length [m] of what has not counted yet."""
+        return math.fsum(math.dist(a, b) for _, segments in self._ways for a, b in segments)
+
 
 def _near(way: Sequence[Point], other: Sequence[Point]) -> bool:
     """Whether the boxes around two ways touch."""

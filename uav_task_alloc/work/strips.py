@@ -53,7 +53,7 @@ def cover(region: Region, width: float, direction: float | None, place: str) -> 
 
     Returns:
         In the order of strips, those of a strip from one end to the other; none where the region
-        has no area outside the barred rings.
+        has no area outside the barred and covered rings.
 
     Raises:
         InvalidValue: there would be more than MOST_PIECES.
@@ -109,7 +109,7 @@ def _strips(given: Region, angle: float, crossed: Iterable[XY], width: float,
             trim: float) -> list[PlaneWay]:
     """Ways in a direction, turned to be along x; edges cross at `crossed`."""
     region, levels = given.turned(-angle), [y for _, y in turn(crossed, -angle)]
-    # without the barred rings, so that a zone changes no strip elsewhere
+    # without barred and covered rings, so that these change no strip elsewhere
     whole = Region(region.outer, region.holes)
     cuts = _cuts(whole, levels, width)
     count = len(cuts) - 1

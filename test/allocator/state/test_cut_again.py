@@ -38,7 +38,7 @@ def test_a_piece_flown_while_it_was_cut_again_counts_where_no_new_cut_is_possibl
     driver.world.set_zones([ThreatZone.cylinder('z', (200.0, across), 15.0)], (), driver.now)
     driver.settle()
 
-    def too_many(_):
+    def too_many(*_):
         raise InvalidValue('strip_width', 20.0, 'wider strips')
     monkeypatch.setattr(driver.world.works, '_cut', too_many)
     assert driver.event('COMPLETED', hit, 'a', revision) == ''

@@ -185,11 +185,17 @@ def _work(body: dict[str, Any]) -> Work:
 def _work_record(task_id: str, body: dict[str, Any]) -> WorkRecord:
     pieces = tuple(map(str, _list_of('pieces', body['pieces'])))
     record = WorkRecord(_work(body['work']), _work(body['announced']), pieces,
-                        _whole_number('last', body['last']))
+                        _whole_number('last', body['last']),
+                        tuple(_width(each) for each in _list_of('widths', body.get('widths', []))))
     _check_same('task id', record.id, task_id)
     for each in pieces:
         _check_same('piece', split_piece(each)[0], task_id)
     return record
+
+
+def _width(body: Any) -> tuple[int, float]:
+    last, width = _list_of('widths', body)
+    return _whole_number('last', last), check_number('widths', width, 0.0, _MAX)
 
 
 def _uav_id(body: Any) -> str:

@@ -12,6 +12,7 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.terrain import Terrain, TerrainError, check_above, read_terrain
+from uav_task_alloc.work.area import NOTHING_FLOWN, FlownStrips
 from uav_task_alloc.work.pieces import Work, pieces_of
 from uav_task_alloc.work.values import Kind
 
@@ -52,11 +53,12 @@ class Ground:
             check_above(self._terrain, f'task {item.id}: position', [item.position])
         return item
 
-    def cut(self, work: Work) -> tuple[Task, ...]:
+    def cut(self, work: Work, flown: FlownStrips = NOTHING_FLOWN) -> tuple[Task, ...]:
         """Cut work around the present zones.
 
         Args:
             work: of any kind.
+            flown: of an area, which is left out.
 
         Returns:
             Its pieces, as `pieces_of` returns them.
@@ -65,7 +67,8 @@ class Ground:
             InvalidValue: there would be too many, one is below the ground, or that is not known.
             TerrainError: the terrain does not reach as far.
         """
-        pieces = pieces_of(work, self._zones(), self._params().clearance, self._terrain)
+        pieces = pieces_of(work, self._zones(), self._params().clearance, self._terrain,
+                           flown)
         if self._terrain is not None:
             for piece in pieces:
                 check_above(self._terrain, f'task {piece.id}: path', piece.path)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from uav_task_alloc.allocator.records import TaskRecord, TaskState, TaskVerdict
+from uav_task_alloc.allocator.state.flown_strips import pieces_around_flown
 from uav_task_alloc.allocator.state.task_state_machine import TaskTransition
 from uav_task_alloc.allocator.state.tasks import MAX_OPEN, UNCHANGED, TaskRegistry
 from uav_task_alloc.allocator.work_records import WorkRecord
@@ -18,6 +19,7 @@ from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point, Task
 from uav_task_alloc.piece_ids import piece_id, split_piece
 from uav_task_alloc.terrain import TerrainError
+from uav_task_alloc.work.area import NOTHING_FLOWN, FlownStrips
 from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.work.recut import FlownWays, main_direction, way_key
 from uav_task_alloc.work.values import Kind
@@ -25,7 +27,7 @@ from uav_task_alloc.work.values import Kind
 # the state of the whole is the first of these that an open piece has
 _OPEN_ORDER = (TaskState.ACTIVE, TaskState.ASSIGNED, TaskState.PENDING, TaskState.UNASSIGNED)
 _WORDS = {Kind.AREA: 'strips', Kind.LINE: 'sections', Kind.ORBIT: 'orbits'}
-CutWork = Callable[[Work], Sequence[Task]]
+CutWork = Callable[[Work, FlownStrips], Sequence[Task]]
 _NO_CUT = InvalidValue, TerrainError
 
 
@@ -69,7 +71,7 @@ class Works:
             return TaskVerdict(work.task.id, False,
                                'duplicate id: another task was announced under it')
         try:
-            pieces = self._cut(work)
+            pieces = self._cut(work, NOTHING_FLOWN)
         except _NO_CUT as error:
             return self._tasks.reject(work.task.id, str(error), stamp)
         whys = [self._refusal(piece, stamp) for piece in pieces]
@@ -109,15 +111,15 @@ class Works:
             return TaskVerdict(known.id, False, f'is {state.name}: nothing to update')
         if work == known.work and self.is_open(known.id):
             return TaskVerdict(known.id, True, UNCHANGED)
-        begun = any(record.state is TaskState.COMPLETED for record in self._present(known))
+        new = known.updated(work)
         try:
-            pieces = self._cut(self._as_cut(replace(known, work=work)) if begun else work)
+            pieces = self._cut_rest(new) if self._flown(new) else self._cut(work, NOTHING_FLOWN)
         except _NO_CUT as error:
             return TaskVerdict(known.id, False, str(error))
         whys = [self._refusal(piece, stamp) for piece in pieces]
-        if all(whys):
+        if whys and all(whys):
             return TaskVerdict(known.id, False, whys[0])
-        self._recut(replace(known, work=work), pieces, stamp, 'changed', renew=True)
+        self._recut(new, pieces, stamp, 'changed', renew=True)
         return TaskVerdict(known.id, True)
 
     def cancel(self, task_id: str, stamp: float) -> TaskVerdict:
@@ -155,10 +157,21 @@ class Works:
 
     def _recut_one(self, known: WorkRecord, stamp: float, why: str) -> bool:
         try:
-            pieces = self._cut(self._as_cut(known))
+            pieces = self._cut_rest(known)
         except _NO_CUT:
             return False  # too many pieces with these zones, or no terrain: it stays as it is
         return self._recut(known, pieces, stamp, why)
+
+    def _cut_rest(self, known: WorkRecord) -> Sequence[Task]:
+        """Cut work as it was cut before; raises as the cut does."""
+        work = self._as_cut(known)
+        return pieces_around_flown(
+            work, self._cut(work, NOTHING_FLOWN), FlownStrips(tuple(
+                (record.task.path, known.strip_width(split_piece(record.task.id)[1]))
+                for record in self._flown(known))), lambda flown: self._cut(work, flown))
+
+    def _flown(self, known: WorkRecord) -> list[TaskRecord]:
+        return [record for record in self._present(known) if record.state is TaskState.COMPLETED]
 
     def _as_cut(self, known: WorkRecord) -> Work:
         """The work with the direction that its strips have."""
@@ -171,9 +184,12 @@ class Works:
                renew: bool = False) -> bool:
         """Take over a new cut: equal pieces keep their ids, and what is flown is left out."""
         present = {record.task.id: record for record in self._present(known)}
-        by_way = _ids_by_way(present.values())
+        # flown strips that were narrower count for what they have covered only
+        whole_strips = [record for record in present.values() if not (
+            record.state is TaskState.COMPLETED and _is_narrow(known, record.task.id))]
+        by_way = _ids_by_way(whole_strips)
         done = [_same_flown(by_way, piece, present) for piece in pieces]
-        flown = FlownWays(record.task.path for record in present.values()
+        flown = FlownWays(record.task.path for record in whole_strips
                           if record.state is TaskState.COMPLETED and record.task.id not in done)
         kept, last, changed = list[str](), known.last, False
         for piece, whole in zip(pieces, done, strict=True):
@@ -225,11 +241,12 @@ class Works:
             uav_id: that has flown it.
 
         Returns:
-            Whether any of it was not flown before.
+            Whether any of it was not flown before; False for a strip that was cut for a smaller
+            strip_width, which leaves a part of the new one.
         """
         known, task = self.records[split_piece(task_id)[0]], self._tasks.records[task_id].task
-        if not FlownWays(record.task.path for record in self._present(known)
-                         if record.state is TaskState.COMPLETED).unflown_parts(task.path):
+        if _is_narrow(known, task_id) or not FlownWays(
+                record.task.path for record in self._flown(known)).unflown_parts(task.path):
             return False
         withdrawn, last = self.state(known) is TaskState.CANCELLED, known.last + 1
         self._tasks.add(replace(task, id=piece_id(known.id, last)), stamp)
@@ -327,6 +344,11 @@ class Works:
     def _put(self, record: WorkRecord) -> None:
         self.records[record.id] = record
         self.unsaved.add(record.id)
+
+
+def _is_narrow(known: WorkRecord, task_id: str) -> bool:
+    """Whether a strip was cut for a smaller strip_width than the present one."""
+    return known.strip_width(split_piece(task_id)[1]) < known.work.strip_width
 
 
 def _ids_by_way(records: Iterable[TaskRecord]) -> dict[tuple[Point, ...], list[str]]:
