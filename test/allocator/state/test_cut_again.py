@@ -29,6 +29,25 @@ def test_work_that_was_cancelled_stays_so_when_a_piece_of_an_earlier_cut_is_flow
     assert route(driver, 'a') == route(driver, 'b') == ()
 
 
+def test_work_that_is_completed_stays_so_when_a_piece_of_an_earlier_cut_is_flown():
+    driver = fleet()
+    driver.add(FIELD)
+    driver.settle()
+    hit, revision = route(driver, 'a')[-1], driver.world.list_of('a').revision
+    driver.world.set_zones([ThreatZone.cylinder('z', (200.0, 60.0), 25.0)], (), driver.now)
+    driver.settle()
+    assert driver.state(hit) == 'CANCELLED'
+    while routes := [each for each in 'ab' if route(driver, each)]:
+        fly(driver, routes[0])
+    assert status(driver).state.name == 'COMPLETED'
+    driver.world.set_zones([], (), driver.now)
+    driver.settle()
+    assert driver.event('COMPLETED', hit, 'a', revision) == ''
+    driver.settle()
+    assert status(driver).state.name == 'COMPLETED'
+    assert route(driver, 'a') == route(driver, 'b') == ()
+
+
 def test_a_piece_flown_while_it_was_cut_again_counts_where_no_new_cut_is_possible(monkeypatch):
     driver = fleet()
     driver.add(FIELD)

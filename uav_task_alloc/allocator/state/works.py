@@ -234,7 +234,7 @@ class Works:
     def flown_after_all(self, task_id: str, uav_id: str, stamp: float) -> bool:
         """Count the way of a replaced piece as flown; the rest is cut without it.
 
-        Work that is CANCELLED stays so.
+        Work that has ended is not cut again.
 
         Args:
             task_id: of the replaced piece.
@@ -248,12 +248,12 @@ class Works:
         if _is_narrow(known, task_id) or not FlownWays(
                 record.task.path for record in self._flown(known)).unflown_parts(task.path):
             return False
-        withdrawn, last = self.state(known) is TaskState.CANCELLED, known.last + 1
+        is_open, last = self.is_open(known.id), known.last + 1
         self._tasks.add(replace(task, id=piece_id(known.id, last)), stamp)
         self._tasks.step(piece_id(known.id, last), TaskTransition.COMPLETE, stamp, uav_id)
         known = replace(known, pieces=(*known.pieces, piece_id(known.id, last)), last=last)
         self._put(known)
-        if not withdrawn:
+        if is_open:
             self._recut_one(known, stamp, 'flown as it was cut before')
         return True
 
