@@ -76,6 +76,20 @@ def test_properties_of_geojson_say_how_a_polygon_is_flown(tmp_path):
     assert work.task.actions[0]['distance'] == pytest.approx(20.0)
 
 
+def test_corners_that_repeat_the_one_before_are_left_out(tmp_path):
+    ring, hole = ([[float(part) for part in word.split(',')] for word in text.split()
+                   for _ in 'ab'] for text in (RING, HOLE))
+    scenario, _ = imported(tmp_path, 'job.geojson', json.dumps({
+        'type': 'FeatureCollection', 'features': [
+            {'type': 'Feature', 'properties': {'name': 'a', 'strip_width': 40},
+             'geometry': {'type': 'Polygon', 'coordinates': [ring, hole]}},
+            {'type': 'Feature', 'properties': {'name': 'b', 'kind': 'zone'},
+             'geometry': {'type': 'Polygon', 'coordinates': [ring]}}]}))
+    work = scenario.tasks[0].work
+    assert (len(work.path), len(work.holes[0])) == (4, 3)
+    assert len(scenario.zones[0].zone.vertices) == 4
+
+
 def test_a_point_of_geojson_can_be_an_orbit(tmp_path):
     scenario, _ = imported(tmp_path, 'job.geojson', json.dumps({
         'type': 'Feature', 'geometry': {'type': 'Point', 'coordinates': [8.547, 47.4]},
@@ -93,6 +107,14 @@ def test_a_survey_keeps_its_angle_width_and_photos(tmp_path):
         (x0, y0, _), (x1, y1, _) = piece.path
         assert math.tan(math.radians(30.0)) == pytest.approx((x1 - x0) / (y1 - y0), abs=1e-6)
     assert notes == []
+
+
+def test_passes_across_that_are_not_imported_are_named(tmp_path):
+    crossed = {**SURVEY, 'TransectStyleComplexItem': {**STYLE, 'Refly90Degrees': True}}
+    for item in (crossed, SURVEY):
+        _, notes = imported(tmp_path, 'job.plan', qgc(item))
+        assert [note.partition(' are not')[0] for note in notes] == [
+            'job.plan: item 1: the passes across its strips (Refly90Degrees)'] * (item is crossed)
 
 
 def test_a_corridor_is_lines_side_by_side(tmp_path):

@@ -26,6 +26,8 @@ from uav_task_alloc.map_files.elements import (
 
 ALTITUDE_MODES = {1: ABOVE_ORIGIN, 2: AMSL}
 ABOVE_TERRAIN = 3, 4  # calculated from terrain data, or by the frame
+_CROSSED = (': the passes across its strips (Refly90Degrees) are not imported: add an area with '
+            'another direction for them')
 _DEGREE = 111_319.5  # [m] of latitude
 _MOST_LAYERS, _MOST_PASSES = 100, 1000  # of a structure scan; of a corridor
 
@@ -60,6 +62,8 @@ def read_complex_item(item: dict[str, Any], where: str, read: MapFile) -> None:
         properties['actions'] = [{'name': 'trigger', 'distance': frontal}]
     count = sum(element.name.startswith(('survey', 'corridor')) for element in read.elements) + 1
     if kind == 'survey':
+        if style.get('Refly90Degrees'):
+            read.left_out.append(where + _CROSSED)
         ring = open_ring(where, _places(item['polygon'], height, where))
         course = math.radians(float(item.get('angle') or 0.0))  # clockwise from north
         direction = round(math.remainder(math.pi / 2 - course, 2 * math.pi), 9)

@@ -172,9 +172,8 @@ class _Rows:
         elif kind == 'tasks' and element.geometry == 'line':
             self._add_work('line', element, {})
         elif kind == 'tasks' and element.geometry == 'polygon' and self._strips(element):
-            self._add_work('area', element, {'holes': [[
-                {'latitude': place.latitude, 'longitude': place.longitude} for place in hole]
-                for hole in element.holes], **self._strips(element)})
+            self._add_work('area', element, {'holes': [_corners(hole) for hole in element.holes],
+                                             **self._strips(element)})
         elif kind == 'tasks':
             self.notes.append(f'{element.where}: a {element.geometry}, which is neither in a '
                               'folder of zones nor has kind: zone; --strip-width makes each an '
@@ -270,9 +269,7 @@ class _Rows:
         if element.geometry == 'polygon':
             if element.holes:
                 self.notes.append(f'{element.where}: the holes of the zone are closed')
-            row: dict[str, Any] = {'shape': 'polygon', 'vertices': [
-                {'latitude': each.latitude, 'longitude': each.longitude}
-                for each in element.places]}
+            row: dict[str, Any] = {'shape': 'polygon', 'vertices': _corners(element.places)}
         elif element.geometry == 'line' or radius is None or radius != radius:
             raise MapFileError(f'{element.where}: a zone that is a {element.geometry}: expected '
                                'a polygon, or a point with a radius')
@@ -306,6 +303,17 @@ class _Rows:
         if name and identifier != name:
             self._renamed.append(f'{element.where}: its id is {identifier}')
         return identifier
+
+
+def _corners(ring: Iterable[Place]) -> list[dict[str, float]]:
+    """Corners of a ring, of which those that repeat the one before are left out."""
+    corners: list[dict[str, float]] = []
+    for place in ring:
+        corner = {'latitude': place.latitude, 'longitude': place.longitude}
+        if not corners or any(abs(corner[key] - corners[-1][key]) > _ONE_PLACE[key]
+                              for key in corner):
+            corners.append(corner)
+    return corners
 
 
 def _given_kind(element: Element) -> str:
