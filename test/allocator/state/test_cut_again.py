@@ -10,7 +10,7 @@ from uav_task_alloc.allocator.records import AnnouncementAction
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.work.pieces import Work, pieces_of
-from uav_task_alloc.work.recut import FlownWays, main_direction
+from uav_task_alloc.work.recut import FlownWays, main_direction, way_key
 from uav_task_alloc.work.values import Kind
 
 
@@ -115,6 +115,32 @@ def test_each_turn_of_an_orbit_is_flown_when_it_is_cut_again():
     driver.settle()
     around = 2 * math.pi * 50.0
     assert open_length(driver, 'mast') == pytest.approx(3 * around - a_turn, rel=0.01)
+
+
+def test_a_part_that_is_left_is_not_taken_for_an_equal_one_that_is_flown():
+    driver = fleet()
+    driver.add(orbit(2.5))
+    works, tasks = driver.world.works, driver.world.tasks.records
+
+    def fly_all(pieces):
+        for each in pieces:
+            uav_id = next(name for name in 'ab' if each in route(driver, name))
+            assert driver.event('COMPLETED', each, uav_id) == ''
+            driver.settle()
+
+    def cut(*zones):
+        driver.world.set_zones(zones, (), driver.now)
+        driver.settle()
+        return works.open_pieces('mast')
+
+    fly_all(cut(ThreatZone.cylinder('z', (-43.0, 175.0), 15.0))[:-1])
+    ways = {each: way_key(tasks[each].task.path, False) for each in cut()}
+    alike = [each for each, way in ways.items() if list(ways.values()).count(way) > 1]
+    fly_all(alike[:1])
+    left = open_length(driver, 'mast')
+    cut(ThreatZone.cylinder('z', (900.0, 0.0), 15.0))
+    assert len(alike) > 1
+    assert open_length(driver, 'mast') == pytest.approx(left)
 
 
 def test_a_line_that_leads_there_and_back_keeps_all_of_its_pieces():

@@ -185,22 +185,20 @@ class Works:
         """Take over a new cut: equal pieces keep their ids, and what is flown is left out."""
         present = {record.task.id: record for record in self._present(known)}
         # flown strips that were narrower count for what they have covered only
-        whole_strips = [record for record in present.values() if not (
-            record.state is TaskState.COMPLETED and _is_narrow(known, record.task.id))]
-        by_way = _ids_by_way(whole_strips)
-        done = [_same_flown(by_way, piece, present) for piece in pieces]
-        flown = FlownWays(record.task.path for record in whole_strips
-                          if record.state is TaskState.COMPLETED and record.task.id not in done)
+        wide = [record for record in self._flown(known) if not _is_narrow(known, record.task.id)]
+        flown_by_way = _ids_by_way(wide)
+        by_way = _ids_by_way(record for record in present.values()
+                             if record.state is not TaskState.COMPLETED)
+        done = [_taken(flown_by_way, piece) for piece in pieces]
+        flown = FlownWays(record.task.path for record in wide if record.task.id not in done)
         kept, last, changed = list[str](), known.last, False
         for piece, whole in zip(pieces, done, strict=True):
             if whole:
                 kept.append(whole)
                 continue
             for part in _parts(piece, flown):
-                if alike := by_way.get(way_key(part.path, part.reversible)):
-                    same = alike.pop(0)
-                    if renew and present[same].state is not TaskState.COMPLETED:
-                        changed |= self._renew(present[same], part, stamp)
+                if same := _taken(by_way, part):
+                    changed |= renew and self._renew(present[same], part, stamp)
                 else:
                     last, changed = last + 1, True
                     same = piece_id(known.id, last)
@@ -352,21 +350,18 @@ def _is_narrow(known: WorkRecord, task_id: str) -> bool:
 
 
 def _ids_by_way(records: Iterable[TaskRecord]) -> dict[tuple[Point, ...], list[str]]:
-    """Ids of pieces by their ways, the flown ones first."""
+    """Ids of pieces by their ways."""
     found = dict[tuple[Point, ...], list[str]]()
-    for record in sorted(records, key=lambda each: each.state is not TaskState.COMPLETED):
+    for record in records:
         found.setdefault(way_key(record.task.path, record.task.reversible), []).append(
             record.task.id)
     return found
 
 
-def _same_flown(by_way: dict[tuple[Point, ...], list[str]], piece: Task,
-                present: dict[str, TaskRecord]) -> str:
-    """A flown piece with the way of another one, taken out of `by_way`; '' for none."""
+def _taken(by_way: dict[tuple[Point, ...], list[str]], piece: Task) -> str:
+    """The id of a piece with the way of another one, taken out of `by_way`; '' for none."""
     alike = by_way.get(way_key(piece.path, piece.reversible))
-    if not alike or present[alike[0]].state is not TaskState.COMPLETED:
-        return ''
-    return alike.pop(0)
+    return alike.pop(0) if alike else ''
 
 
 def _parts(piece: Task, flown: FlownWays) -> list[Task]:
