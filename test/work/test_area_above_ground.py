@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Areas whose heights are above the ground are covered up to the zones, as level ones are."""
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.terrain import Terrain
 from uav_task_alloc.work.pieces import pieces_of
+from uav_task_alloc.work.recut import FlownWays
 from uav_task_alloc.work.values import Vertical
 
 STEP, NODES = 0.0005, 60  # [deg] some 50 m; of each side
@@ -19,10 +21,11 @@ AREA = replace(field([(0.0, 0.0), (400.0, 0.0), (400.0, 240.0), (0.0, 240.0)], 4
                      direction=0.0), vertical=Vertical.TERRAIN)
 
 
-def slope():
-    """A hillside around the origin that rises to the east."""
+def slope(rough=0.0):
+    """A hillside around the origin that rises to the east, with random heights [m] on it."""
     origin = Origin(47.0, 8.0, 500.0)
     heights = np.tile(500.0 + SLOPE * np.arange(NODES), (NODES, 1))
+    heights += rough * np.random.default_rng(1).random((NODES, NODES))
     return Terrain(heights, lambda longitude, latitude: (
         (longitude - 8.0) / STEP + NODES / 2, (47.0 - latitude) / STEP + NODES / 2), origin)
 
@@ -37,6 +40,17 @@ def test_strips_turn_along_a_zone_that_bars_all_of_them(zone):
         assert path_is_clear(piece.path, [zone], 5.0)
         raster.fly(piece.path, AREA.strip_width)
     assert raster.share() >= 0.995
+
+
+def test_what_is_left_of_a_strip_has_the_heights_of_the_whole():
+    ground, zone = slope(rough=30.0), ThreatZone.cylinder('z', (200.0, 110.0), 60.0)
+    whole = FlownWays(piece.path for piece in pieces_of(AREA, (), 0.0, ground))
+    parts = [part for piece in pieces_of(AREA, [zone], 0.0, ground)
+             for part in whole.unflown_parts(piece.path)]
+    # along the zone only
+    assert parts
+    assert all(math.dist(point[:2], (200.0, 110.0)) < 60.0 + AREA.strip_width
+               for part in parts for point in part)
 
 
 def test_a_zone_below_a_part_of_the_ways_ends_them_where_they_enter_it():

@@ -106,6 +106,6 @@ def _ways_over(work: Work, zones: Sequence[ThreatZone], clearance: float,
         barring = barring_zones(through, zones, clearance)
     if barring:
         around = cut(work, tuple(barring.values()), clearance)
-        ways = following_ways(work, around, ground) if around else []
+        ways = following_ways(work, around, ground, through) if around else []
     others = [zone for zone in zones if zone.id not in barring]
     return [part for way in ways for part in free_ways(way, others, clearance)] or through

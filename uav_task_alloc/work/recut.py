@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from uav_task_alloc.geometry.polyline import (
     point_at,
     polyline_length,
@@ -64,7 +66,10 @@ class FlownWays:
     """
 
     def __init__(self, ways: Iterable[Sequence[Point]]) -> None:
-        self._ways = [(tuple(way), list(pairwise(way))) for way in ways]
+        given = [tuple(way) for way in ways]
+        self._segments = [list(pairwise(way)) for way in given]  # what has not counted yet
+        self._low = np.array([np.min(way, axis=0) for way in given]).reshape(-1, 3) - _BESIDE
+        self._high = np.array([np.max(way, axis=0) for way in given]).reshape(-1, 3) + _BESIDE
 
     def unflown_parts(self, way: Sequence[Point]) -> list[tuple[Point, ...]]:
         """Return the parts of a way along which none of the flown ways leads.
@@ -78,7 +83,9 @@ class FlownWays:
             [m] in the order of `way`, each of at least 0.5 m; `way` itself where none of it is
             flown.
         """
-        near = [segments for each, segments in self._ways if _near(way, each)]
+        boxes_touch = ((np.min(way, axis=0) <= self._high)
+                       & (np.max(way, axis=0) >= self._low)).all(axis=1)
+        near = [self._segments[k] for k in np.flatnonzero(boxes_touch)]
         if not near:
             return [tuple(way)]
         parts: list[list[Point]] = []
@@ -99,14 +106,7 @@ class FlownWays:
 
     def length_left(self) -> float:
         """Return the length [m] of what has not counted yet."""
-        return math.fsum(math.dist(a, b) for _, segments in self._ways for a, b in segments)
-
-
-def _near(way: Sequence[Point], other: Sequence[Point]) -> bool:
-    """Whether the boxes around two ways touch."""
-    return all(min(p[k] for p in way) <= max(p[k] for p in other) + _BESIDE
-               and min(p[k] for p in other) <= max(p[k] for p in way) + _BESIDE
-               for k in range(3))
+        return math.fsum(math.dist(a, b) for segments in self._segments for a, b in segments)
 
 
 def _without_flown(a: Point, b: Point, rest: list[_Shares],
