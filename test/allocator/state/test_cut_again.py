@@ -14,7 +14,8 @@ from uav_task_alloc.work.recut import FlownWays, main_direction, way_key
 from uav_task_alloc.work.values import Kind
 
 
-def test_work_that_was_cancelled_stays_so_when_a_piece_of_an_earlier_cut_is_flown():
+def cut_by_a_zone():
+    """A fleet with a zone over the first piece of `a`; the piece, and the list of `a` before."""
     driver = fleet()
     driver.add(FIELD)
     driver.settle()
@@ -22,6 +23,11 @@ def test_work_that_was_cancelled_stays_so_when_a_piece_of_an_earlier_cut_is_flow
     across = driver.world.tasks.records[hit].task.path[0][1]
     driver.world.set_zones([ThreatZone.cylinder('z', (200.0, across), 15.0)], (), driver.now)
     driver.settle()
+    return driver, hit, revision
+
+
+def test_work_that_was_cancelled_stays_so_when_a_piece_of_an_earlier_cut_is_flown():
+    driver, hit, revision = cut_by_a_zone()
     assert driver.cancel('field')[0].accepted
     assert driver.event('COMPLETED', hit, 'a', revision) == ''
     driver.settle()
@@ -49,13 +55,7 @@ def test_work_that_is_completed_stays_so_when_a_piece_of_an_earlier_cut_is_flown
 
 
 def test_a_piece_flown_while_it_was_cut_again_counts_where_no_new_cut_is_possible(monkeypatch):
-    driver = fleet()
-    driver.add(FIELD)
-    driver.settle()
-    hit, revision = route(driver, 'a')[0], driver.world.list_of('a').revision
-    across = driver.world.tasks.records[hit].task.path[0][1]
-    driver.world.set_zones([ThreatZone.cylinder('z', (200.0, across), 15.0)], (), driver.now)
-    driver.settle()
+    driver, hit, revision = cut_by_a_zone()
 
     def too_many(*_):
         raise InvalidValue('strip_width', 20.0, 'wider strips')
