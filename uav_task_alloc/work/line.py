@@ -2,15 +2,13 @@
 """LINE: a way through points, flown from either end; cut where it enters zones."""
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.polyline import point_at
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.work.values import Geometry, check_steps, refuse_unused
-from uav_task_alloc.work.zone_sections import free_parts
+from uav_task_alloc.work.zone_sections import free_parts, joined_parts
 
 _USED = ('path',)
 _SHORTEST = 0.1  # [m] of what is left of a way beside a zone
@@ -56,23 +54,4 @@ def free_ways(path: Sequence[Point], zones: Sequence[ThreatZone],
     Returns:
         Polylines in the order of the path.
     """
-    ways: list[list[Point]] = []
-    open_end = False  # the last way ends at the next point
-    for a, b in pairwise(path):
-        end = 0.0
-        for start, end in free_parts(a, b, zones, clearance):
-            p, q = _at(a, b, start), _at(a, b, end)
-            if start == 0.0 and open_end:
-                ways[-1].append(q)
-            else:
-                ways.append([p, q])
-        open_end = end == 1.0
-    return [tuple(way) for way in ways
-            if math.fsum(math.dist(a, b) for a, b in pairwise(way)) >= _SHORTEST]
-
-
-def _at(a: Point, b: Point, share: float) -> Point:
-    if share in (0.0, 1.0):
-        return b if share else a
-    x, y, z = point_at(a, b, share)
-    return x, y, z
+    return joined_parts(path, lambda a, b: free_parts(a, b, zones, clearance), _SHORTEST)

@@ -8,13 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from uav_task_alloc.geometry.polyline import (
-    point_at,
-    polyline_length,
-    segment_distance,
-    segment_fraction,
-)
+from uav_task_alloc.geometry.polyline import segment_distance, segment_fraction
 from uav_task_alloc.model import Point
+from uav_task_alloc.work.zone_sections import joined_parts, segment_point
 
 _Shares = tuple[float, float]  # of a segment, from and to
 _Segment = tuple[Point, Point]  # [m]
@@ -88,21 +84,14 @@ class FlownWays:
         near = [self._segments[k] for k in np.flatnonzero(boxes_touch)]
         if not near:
             return [tuple(way)]
-        parts: list[list[Point]] = []
-        open_end = False  # the last part goes on
-        for a, b in pairwise(way):
+
+        def rest_of(a: Point, b: Point) -> list[_Shares]:
             rest = [(0.0, 1.0)]
             for segments in near:
                 rest = _without_flown(a, b, rest, segments)
-            open_end &= bool(rest)
-            for low, high in rest:
-                start, end = _at(a, b, low), _at(a, b, high)
-                if low == 0.0 and open_end:
-                    parts[-1].append(end)
-                else:
-                    parts.append([start, end])
-                open_end = high == 1.0
-        return [tuple(part) for part in parts if polyline_length(part) >= _SHORTEST]
+            return rest
+
+        return joined_parts(way, rest_of, _SHORTEST)
 
     def length_left(self) -> float:
         """Return the length [m] of what has not counted yet."""
@@ -120,9 +109,10 @@ def _without_flown(a: Point, b: Point, rest: list[_Shares],
         if used:
             rest = [(s, t) for low, high in rest
                     for s, t in ((low, min(high, start)), (max(low, end), high)) if s < t]
-        shares = [sorted(segment_fraction(_at(a, b, share), c, d) for share in span)
+        shares = [sorted(segment_fraction(segment_point(a, b, share), c, d) for share in span)
                   for span in used]
-        segments += [(_at(c, d, s), _at(c, d, t)) for s, t in _rest([(s, t) for s, t in shares])]
+        segments += [(segment_point(c, d, s), segment_point(c, d, t))
+                     for s, t in _rest([(s, t) for s, t in shares])]
     return rest
 
 
@@ -131,7 +121,8 @@ def _overlap(a: Point, b: Point, c: Point, d: Point) -> _Shares | None:
     ends = segment_fraction(c, a, b), segment_fraction(d, a, b)
     low, high = max(0.0, min(ends)), min(1.0, max(ends))
     if (high - low) * math.dist(a, b) < _BESIDE or any(
-            segment_distance(_at(a, b, share), c, d) > _BESIDE for share in (low, high)):
+            segment_distance(segment_point(a, b, share), c, d) > _BESIDE
+            for share in (low, high)):
         return None
     return low, high
 
@@ -144,10 +135,3 @@ def _rest(spans: list[_Shares]) -> list[_Shares]:
             left.append((at, low))
         at = max(at, high)
     return [*left, (at, 1.0)] if at < 1.0 else left
-
-
-def _at(a: Point, b: Point, share: float) -> Point:
-    if share in (0.0, 1.0):
-        return b if share else a
-    x, y, z = point_at(a, b, share)
-    return x, y, z

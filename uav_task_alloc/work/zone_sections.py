@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Horizontal sections of enlarged zones, and the parts of a straight way that are outside them."""
+"""Horizontal sections of enlarged zones, and the parts of ways that are outside them."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 
 from uav_task_alloc.geometry.polygon import XY, edges
+from uav_task_alloc.geometry.polyline import point_at, polyline_length
 from uav_task_alloc.model import Point, Shape, ThreatZone
 
 # corners [m], counter-clockwise; it may cross itself: winding numbers above 0 are inside
@@ -181,3 +183,47 @@ def _wound(crossings: Iterable[tuple[float, int]]) -> Iterable[Span]:
         winding += sign
         if winding == 0:
             yield start, at
+
+
+def segment_point(start: Point, end: Point, share: float) -> Point:
+    """Return the point at a share of a segment, which is exact at both of its ends.
+
+    Args:
+        start, end: [m].
+        share: 0.0 at `start`, 1.0 at `end`.
+
+    Returns:
+        [m].
+    """
+    if share in (0.0, 1.0):
+        return end if share else start
+    x, y, z = point_at(start, end, share)
+    return x, y, z
+
+
+def joined_parts(way: Sequence[Point],
+                 shares_of: Callable[[Point, Point], Iterable[Span]],
+                 shortest: float) -> list[tuple[Point, ...]]:
+    """Return parts of a polyline, of which those that touch at its points are one.
+
+    Args:
+        way: [m], at least two points.
+        shares_of: returns the shares of a segment, from and to, that are in a part, in order;
+            called once for each segment, in order.
+        shortest: [m] shorter parts are left out.
+
+    Returns:
+        [m] in the order of `way`.
+    """
+    parts: list[list[Point]] = []
+    open_end = False  # the last part ends at the next point
+    for a, b in pairwise(way):
+        high = 0.0
+        for low, high in shares_of(a, b):
+            end = segment_point(a, b, high)
+            if low == 0.0 and open_end:
+                parts[-1].append(end)
+            else:
+                parts.append([segment_point(a, b, low), end])
+        open_end = high == 1.0
+    return [tuple(part) for part in parts if polyline_length(part) >= shortest]
