@@ -8,7 +8,7 @@ from launch_ros.substitutions import FindPackageShare
 from launch import LaunchDescription
 from uav_task_alloc.nodes.ros.launch_arguments import declared, refuse_unknown
 
-_TOPICS = ['allocation_markers', *(f'uav_{k}/path' for k in range(1, 5))]
+_TOPICS = ['allocation_markers', 'fence_area', *(f'uav_{k}/path' for k in range(1, 5))]
 
 
 ARGUMENTS = {

@@ -52,9 +52,10 @@ def test_rviz_shows_the_topics_of_the_allocator_in_their_frame():
             topics[each['Class'].split('/')[1]].append(each['Topic']['Value'])
             assert each['Topic']['Durability Policy'] == 'Transient Local'
     assert topics == {'Grid': [], 'MarkerArray': ['/allocation_markers'],
+                      'Polygon': ['/fence_area'],
                       'Path': [f'/uav_{k}/path' for k in range(1, 5)]}
     assert all(topic.split('/')[-1] in (ROOT / 'launch/rviz.launch.py').read_text()
-               for topic in [*topics['MarkerArray'], *topics['Path']])
+               for topic in [*topics['MarkerArray'], *topics['Polygon'], *topics['Path']])
 
 
 @pytest.mark.parametrize('path', sorted(ROOT.glob('msg_defs/*/*')), ids=lambda p: p.name)

@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parent.parent
 TYPINGS = ROOT / 'tools' / 'typings'
 OWN = 'uav_task_alloc_msgs'
 USED = (  # of other packages, by nodes/; the types of their fields follow
-    'diagnostic_msgs/msg/DiagnosticArray', 'nav_msgs/msg/Path', 'std_srvs/srv/Trigger',
+    'diagnostic_msgs/msg/DiagnosticArray', 'geometry_msgs/msg/PolygonStamped',
+    'nav_msgs/msg/Path', 'std_srvs/srv/Trigger',
     'rcl_interfaces/msg/ParameterDescriptor', 'rcl_interfaces/msg/SetParametersResult',
     'rosgraph_msgs/msg/Clock', 'visualization_msgs/msg/MarkerArray')
 _FIELD = re.compile(r'([\w/]+)(?:<=\d+)?(\[[^]]*\])?\s+(\w+)\s*(=)?')

@@ -60,6 +60,9 @@ class AllocatorParams(FrameParams):
                                 unit='m')
     altitude_max: float = param(1e5, 'Highest detour, above the origin.', low=-1e5, high=1e5,
                                 unit='m')
+    fence_area: tuple[str, ...] = param(
+        (), 'Corners `LATITUDE,LONGITUDE` of the area that no plan leaves; empty: none.',
+        fixed=True)
     terrain: str = param('', 'GeoTIFF of the ground, heights above mean sea level; empty: none.',
                          fixed=True)
     terrain_clearance: float = param(30.0, 'Distance that legs keep from the ground of '

@@ -24,6 +24,8 @@ USED_KEYS = {  # values of a zone by its shape, beside id, shape and margin
     Shape.POLYGON: ('vertices', 'z_min', 'z_max')}
 _DIMENSIONS = ('center', 'radius', 'z_min', 'z_max', 'vertices')
 
+OUTSIDE_AREA = 'outside of fence_area'  # ids of the allocator's own zones begin with it
+
 
 @dataclass(frozen=True, slots=True)
 class ZoneFormat:
@@ -120,6 +122,8 @@ def decode_zone_array(msg: Any) -> tuple[list[ThreatZone], dict[str, str]]:
     invalid: dict[str, str] = {}
     for zone in msg.zones:
         try:
+            if zone.zone_id.startswith(OUTSIDE_AREA):
+                raise InvalidValue('zone_id', zone.zone_id, f'no {OUTSIDE_AREA!r} in front')
             if zone.zone_id in valid:
                 raise InvalidValue('zone_id', zone.zone_id, 'each id once')
             valid[zone.zone_id] = decode_zone_message(zone)

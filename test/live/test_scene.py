@@ -46,6 +46,12 @@ def test_only_parts_that_a_line_changed_are_sent_again():
     assert updates(FIRST, [planned(BEGIN + 1, 2, 'background')])[0] == {}
 
 
+def test_the_area_that_plans_stay_in_is_on_the_page():
+    corners = [[0.04, 0.0], [900.0, 0.0], [900.0, 600.0]]
+    parts, _, _ = updates(FIRST, [{'kind': 'fence_area', 'wall': BEGIN, 'corners': corners}])
+    assert parts == {'fence_area': [[0.0, 0.0], [900.0, 0.0], [900.0, 600.0]]}
+
+
 def test_arrivals_count_from_the_stamp_of_the_list():
     parts, _, _ = updates([{'kind': 'run', 'wall': BEGIN, 'speedup': 8.0}, *FIRST])
     assert [(task['id'], task['at']) for task in parts['list u1']['tasks']] == [

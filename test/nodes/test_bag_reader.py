@@ -14,6 +14,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_definitions import definition
 from uav_task_alloc.nodes.conversions.messages import announcement, from_zones, header
+from uav_task_alloc.nodes.conversions.path_messages import area_message
 from uav_task_alloc.record.bag import Bag
 from uav_task_alloc.record.bag_reader import BagReader
 
@@ -44,7 +45,8 @@ def write(path, messages, about=None, flush_every=2):
     """A bag with a chunk for each two messages, 1 s apart."""
     with Bag(path, about or {'speedup': '2.0'}) as bag:
         for k, (topic, message) in enumerate(messages):
-            name = f'{OURS}{type(message).__name__}'
+            package, kind, _ = type(message).__module__.split('.')
+            name = f'{package}/{kind}/{type(message).__name__}'
             if topic not in bag.channels:
                 bag.open(topic, name, definition(name))
             when = 1_700_000_000_000_000_000 + k * 1_000_000_000
@@ -91,6 +93,14 @@ def test_the_origin_that_the_fleet_published_is_that_of_the_bag(tmp_path):
     assert lines[1] == {'kind': 'origin', 'wall': 1.7e9, 'latitude': 47.0, 'longitude': 8.0,
                         'altitude_amsl': 400.0}
     assert len(lines[2]['tasks']) == 1
+
+
+def test_the_fence_area_is_the_polygon_of_that_name(tmp_path):
+    area = area_message(((0.0, 0.0), (9.0, 0.0), (9.0, 9.0)), 0.0)
+    lines = list(BagReader(write(tmp_path / 'a.mcap', [
+        ('/fence_area', area), ('/field/outline', area), ('/fence_area', area_message((), 0.0))])))
+    assert [(line['kind'], list(line['corners'])) for line in lines[1:]] == [
+        ('fence_area', [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0)]), ('fence_area', [])]
 
 
 def test_a_task_in_degrees_that_was_announced_before_the_origin_has_its_place(tmp_path):

@@ -36,6 +36,10 @@ def flight_map(history: FlightHistory) -> Any:
     figure = go.Figure()
     for interval in history.run.zones:
         _add_zone(figure, interval.zone)
+    if corners := history.run.fence_area:
+        x, y = zip(*corners, corners[0], strict=True)
+        figure.add_scatter(x=x, y=y, mode='lines', name='fence_area', hoverinfo='name',
+                           line={'color': RED, 'width': 2.0, 'dash': 'dash'})
     for k, uav in enumerate(sorted(history.tracks.keys() | history.run.lists.keys())):
         flown = [sample.point for sample in history.tracks.get(uav, ())]
         legs = [point for leg in history.planned.get(uav, ()) for point in (*leg, None)]

@@ -24,7 +24,8 @@ _REST_MODES = ('STANDBY', 'HOLD')  # as in page/model.js
 _LEAST_SPEED = 0.5  # [m/s]; the course of a slower UAV is noise
 # by kind of a line: the part of the page that it changes
 _PART_OF_KIND = {'announcement': 'tasks', 'statuses': 'statuses', 'zones': 'zones',
-                 'state': 'uavs', 'uploads': 'uavs', 'origin': 'origin', 'proposal': 'orders'}
+                 'state': 'uavs', 'uploads': 'uavs', 'origin': 'origin', 'proposal': 'orders',
+                 'fence_area': 'fence_area'}
 LogEntry = dict[str, Any]  # of a log: `wall` [unix s] and the values that the page shows
 
 
@@ -140,6 +141,8 @@ class Scene:
         if name == 'origin':  # [deg, deg, m]
             return run.origin and [run.origin.latitude, run.origin.longitude,
                                    run.origin.altitude_amsl]
+        if name == 'fence_area':  # [east, north] [m] of its corners
+            return [to_decimetres(corner) for corner in run.fence_area]
         if name == 'tasks':  # [east, north, up] [m] by id
             return {task: to_decimetres(row.position) for task, row in run.tasks.items()}
         if name == 'statuses':  # [state, UAV, reason] by id

@@ -27,6 +27,7 @@ from uav_task_alloc.allocator.replanning.worker import Worker
 from uav_task_alloc.allocator.state.ground import read_ground
 from uav_task_alloc.allocator.status import health_values, health_warnings
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.fence_area import area_corners
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes.conversions import announcements
 from uav_task_alloc.nodes.conversions.diagnostics import allocator_row, from_diagnostics
@@ -68,8 +69,8 @@ class AllocatorNode(Node):
     Publishes:
         `<uav_id>/task_list` (TaskList), `task_statuses` (TaskStatusArray), `allocation`
         (Allocation), `allocation_markers` (MarkerArray), `<uav_id>/path` (nav_msgs/Path),
-        `fleet_origin` (FleetOrigin), `<uav_id>/hold` (UavHold), `plan_proposal`
-        (PlanProposal), all latched; `separation_alerts` (SeparationAlert);
+        `fence_area` (PolygonStamped), `fleet_origin` (FleetOrigin), `<uav_id>/hold` (UavHold),
+        `plan_proposal` (PlanProposal), all latched; `separation_alerts` (SeparationAlert);
         `/diagnostics` (DiagnosticArray).
     Subscribes to:
         `uav_states` (UavState), `task_announcements` (TaskAnnouncement), `threat_zones`
@@ -117,7 +118,8 @@ class AllocatorNode(Node):
     def _create_topics(self) -> None:
         self.publisher = AllocationPublisher(self, self.world)
         self.publisher.prepare(self.world.lists_in_force())
-        self.markers = MarkerPublisher(self, self.world)
+        self.markers = MarkerPublisher(self, self.world, area_corners(
+            self.live.now.fence_area, self.origin))
         self.orders = OrderServices(self, self.core, self.save, self.stamp,
                                     self.origins.conflict)
         self.diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)

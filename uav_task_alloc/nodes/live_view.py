@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PolygonStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from uav_task_alloc_msgs import msg as m
@@ -87,7 +88,7 @@ class LiveView(Node):
         (ThreatZoneArray), `task_statuses` (TaskStatusArray), `allocation` (Allocation),
         `<uav_id>/task_list` (TaskList), `plan_proposal` (PlanProposal),
         `separation_alerts` (SeparationAlert),
-        `fleet_origin` (FleetOrigin), `/diagnostics`
+        `fleet_origin` (FleetOrigin), `fence_area` (PolygonStamped), `/diagnostics`
         (DiagnosticArray).
     Parameters:
         LiveViewParams, see docs/parameters.md.
@@ -135,6 +136,7 @@ class LiveView(Node):
         self.create_subscription(m.TaskAnnouncement, _TASKS, self.on_announcement, ANNOUNCEMENTS)
         self.create_subscription(m.FleetOrigin, 'fleet_origin', self.on_origin, LATCHED)
         self._subscribe(m.ThreatZoneArray, 'threat_zones', LATCHED, message_records.zones_record)
+        self._subscribe(PolygonStamped, 'fence_area', LATCHED, message_records.fence_area_record)
         self._subscribe(m.TaskStatusArray, 'task_statuses', LATCHED,
                         message_records.statuses_record)
         self._subscribe(m.Allocation, 'allocation', ANNOUNCEMENTS,

@@ -65,6 +65,12 @@ class MapFigure:
         text = '\n'.join(filter(None, (zone.id, style.height_text(zone), note)))
         self._labels.append(Label(text, x, y, SMALL, 12.0, DARK_RED, bold=True, within=True))
 
+    def fence_area(self, corners: Sequence[tuple[float, float]]) -> None:
+        """Add the area [m] that plans stay in, if there is one."""
+        if corners:
+            x, y = zip(*corners, corners[0], strict=True)
+            self.axes.plot(x, y, '--', color=RED, lw=2.0, zorder=2)
+
     def _ring(self, zone: ThreatZone) -> None:
         """The section of a hemisphere at the median height of the tasks."""
         above = self.height - zone.center[2]

@@ -35,6 +35,7 @@ def draw_flight(out_dir: str | Path, png: str | Path) -> None:
         late = interval.since > state.start() + _AT_START * state.stretch
         note = f'from {state.clock(interval.since):.0f} s' if late else ''
         figure.zone(interval.zone, note, late)
+    figure.fence_area(state.fence_area)
     indices = {uav: index for index, uav in enumerate(sorted(truth.tracks))}
     handles = _tracks(figure, state, truth, indices)
     handles += _tasks(figure, state, truth, indices)

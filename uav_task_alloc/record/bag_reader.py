@@ -24,6 +24,7 @@ from uav_task_alloc.record.record_file import Line
 _PACKAGE = 'uav_task_alloc_msgs/msg/'
 _ORIGIN, _LIST = _PACKAGE + 'FleetOrigin', _PACKAGE + 'TaskList'
 _ANNOUNCEMENT = _PACKAGE + 'TaskAnnouncement'
+_AREA, _AREA_TOPIC = 'geometry_msgs/msg/PolygonStamped', '/fence_area'
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 _MAX_RECORD_SIZE = 2**30  # [bytes]; a larger size is damage
 # by type, so that the names of the topics do not matter
@@ -35,6 +36,7 @@ _BUILDERS: dict[str, Callable[[Any], message_records.RecordBody]] = {
     _PACKAGE + 'UavState': message_records.state_record,
     _PACKAGE + 'SeparationAlert': message_records.separation_record,
     _ORIGIN: message_records.origin_record,
+    _AREA: message_records.fence_area_record,
     _DIAGNOSTICS: diagnostic_records.uploads_record}
 _TYPES = frozenset({*_BUILDERS, _ANNOUNCEMENT})
 
@@ -171,6 +173,8 @@ class BagReader:
         """
         if type_name == _DIAGNOSTICS:
             return True
+        if type_name == _AREA and not topic.endswith(_AREA_TOPIC):
+            return False
         *above, name = topic.split('/')
         namespace = '/'.join(above[:-1] if type_name == _LIST else above) or '/'  # <uav_id>/
         if self.namespace is not None:

@@ -9,7 +9,7 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from uav_task_alloc.checks import FAR, check_number, check_point
+from uav_task_alloc.checks import FAR, check_number, check_point, check_polygon
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point
@@ -154,6 +154,23 @@ def zones_record(msg: _Message) -> RecordBody:
     valid, invalid = decode_zone_array(msg)
     return {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in valid],
             **({'kept': list(invalid)} if invalid else {})}
+
+
+def fence_area_record(msg: _Message) -> RecordBody:
+    """Return the area that plans stay in.
+
+    Args:
+        msg: PolygonStamped in ENU [m]; without points: there is none.
+
+    Returns:
+        Kind `fence_area`, its corners [m].
+
+    Raises:
+        InvalidValue: it has one or two points, or another point than a finite one.
+    """
+    points = [(point.x, point.y) for point in msg.polygon.points]
+    return {'kind': 'fence_area',
+            'corners': check_polygon('fence_area', points) if points else ()}
 
 
 def statuses_record(msg: _Message) -> RecordBody:

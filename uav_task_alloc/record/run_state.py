@@ -78,6 +78,7 @@ class RunState:
     rate: float = 1.0  # scenario seconds in a second of real time
     simulated: bool = False  # `wall` is the time of /clock
     origin: Origin | None = None  # of the ENU frame; None: not known yet
+    fence_area: list[tuple[float, float]] = field(default_factory=list)  # corners [m] or none
     measured: bool = True  # `rate` is that of the vehicles' clocks, as no one stated it
     clock_rates: dict[str, float] = field(default_factory=dict)  # of the vehicles, by UAV
     first: float = math.inf  # [unix s] of the first line
@@ -109,6 +110,10 @@ class RunState:
     def on_origin(self, line: Line) -> None:
         """The origin of the ENU frame, as a node of the fleet published it."""
         self.origin = Origin(line['latitude'], line['longitude'], line['altitude_amsl'])
+
+    def on_fence_area(self, line: Line) -> None:
+        """The area that plans stay in."""
+        self.fence_area = [(x, y) for x, y in line['corners']]
 
     def on_announcement(self, line: Line) -> None:
         """ADD, UPDATE or CANCEL of tasks."""

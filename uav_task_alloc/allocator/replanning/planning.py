@@ -86,7 +86,7 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
     return ReplanProblem(
         world.version, trigger, background,
         params.background_budget if background else params.solve_budget, uavs,
-        tasks, tuple(world.zones.values()), locked,
+        tasks, world.no_fly_zones(), locked,
         published=with_later_trips(replace(best, routes=routes, legs=legs, reversed=frozenset(
             stop.task.id for each in published.values() for stop in each.stops
             if stop.reversed and stop.task.id not in under_way)), world),

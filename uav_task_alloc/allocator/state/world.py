@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The state of the allocator: applies announcements, reports, events and zones; requests plans.
-
-`now` is [s] of a steady clock, for timeouts; `stamp` is [s] of the published clock.
-"""
+"""The state of the allocator: applies announcements, reports, events and zones; requests plans."""
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -24,6 +21,7 @@ from uav_task_alloc.allocator.state.admission import Admission
 from uav_task_alloc.allocator.state.announcements import Announcements
 from uav_task_alloc.allocator.state.callbacks import RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
+from uav_task_alloc.allocator.state.fence_walls import zones_outside
 from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord, jump_distance, replan_reasons
 from uav_task_alloc.allocator.state.flights import Flights
 from uav_task_alloc.allocator.state.ground import Ground
@@ -61,16 +59,15 @@ class World:
 
     Arguments of methods:
         action: ADD or UPDATE.
-        tasks: as announced; of a list: in the order of flight.
-        task_id, task_ids: as announced.
+        tasks, task_id, task_ids: as announced; tasks of a list: in the order of flight.
         uav_id: of a UAV, known or not where the text does not say `known`.
         report, event: of a UAV.
         zones: the whole set.
         bad: ids of refused zones.
         lists: one a UAV, see `build_lists`.
         steps: events for tasks, see `task_steps`.
-        now: [s] steady clock.
-        stamp: [s] clock of the node.
+        now: [s] steady clock, for timeouts.
+        stamp: [s] published clock of the node.
         reason, trigger, text: for the log.
         available: what an operator sets.
         warning, debug: its level in the log; otherwise information.
@@ -87,7 +84,7 @@ class World:
         # of the allocation; and the first one with the lists in force
         self.revision = self.plan_revision = saved.revision
         self.version, self.outbox, self.proposal = 0, Outbox(), saved.proposal
-        self.zones = {zone.id: zone for zone in saved.zones}
+        self.zones, self._outside = {each.id: each for each in saved.zones}, zones_outside(params)
         self.restart_hold = any(each.stops for each in saved.lists)  # no task changes its UAV
         self.kernels_ready = False  # compiled: checks of zones are fast
         self._paths: SafePaths | None = None
@@ -110,7 +107,7 @@ class World:
         self.zone_checks = ZoneChecks(self.fleet, self.lists, self.paths, self.note,
                                       self.request_replan)
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
-        self.ground = Ground(terrain, lambda: tuple(self.zones.values()), lambda: self.params)
+        self.ground = Ground(terrain, self.no_fly_zones, lambda: self.params)
         self.works = Works(self.tasks, saved.works, self.ground.cut, self.deadlines.refusal)
         self.lists.forget_tasks({each.task.id for each in saved.tasks} - {*self.tasks.records})
         seen = SeenTasks(saved.seen_tasks.items(), lambda: self.params.anticipate != 'off')
@@ -273,8 +270,12 @@ class World:
         """Return the paths around the present zones."""
         if self._paths is None or self._paths_params is not self.params:
             self._paths_params = self.params
-            self._paths = self._make_safe_paths(tuple(self.zones.values()), self.params)
+            self._paths = self._make_safe_paths(self.no_fly_zones(), self.params)
         return self._paths
+
+    def no_fly_zones(self) -> tuple[ThreatZone, ...]:
+        """Return the present zones, and those that cover what is outside of `fence_area`."""
+        return (*self.zones.values(), *self._outside)
 
     def task_records(self) -> Mapping[str, TaskRecord]:
         """Return the accepted tasks, by id."""

@@ -113,6 +113,24 @@ export function drawZones(context, view, zones, colours) {
   }
 }
 
+// The area that plans stay in: all outside of it is covered like a zone.
+export function drawArea(context, view, area, colours) {
+  if (!area.length) return;
+  const pixels = area.map(view.pixel);
+  context.beginPath();
+  context.rect(0, 0, view.width, view.height);
+  pixels.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.closePath();
+  context.fillStyle = colours.zone + '20';
+  context.fill('evenodd');
+  line(context, pixels, true);
+  context.strokeStyle = colours.zone;
+  context.lineWidth = 2;
+  context.setLineDash([10, 5]);
+  context.stroke();
+  context.setLineDash([]);
+}
+
 // routes
 
 export function drawRoutes(context, view, scene, colours) {

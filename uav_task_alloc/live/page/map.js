@@ -3,7 +3,7 @@
 import {DemandLayer} from './demand.js';
 import {degreesText, frameOf, metresText, roundStep} from './geo.js';
 import {listen} from './gestures.js';
-import {RINGS, drawGrid, drawRings, drawRoutes, drawTasks, drawWaits, drawWorks,
+import {RINGS, drawArea, drawGrid, drawRings, drawRoutes, drawTasks, drawWaits, drawWorks,
   drawZones, themeColours, zoneOutline} from './layers.js';
 import {Overlay} from './overlay.js';
 import {Tiles} from './tiles.js';
@@ -98,9 +98,9 @@ export class FleetMap {
   }
 
   bounds() {
-    const {tasks, uavs, zones, routes, works} = this.scene;
+    const {tasks, uavs, zones, area, routes, works} = this.scene;
     const points = [...tasks.map(task => task.position), ...uavs.map(uav => uav.position),
-      ...works.flatMap(work => work.path),
+      ...works.flatMap(work => work.path), ...area,
       ...zones.flatMap(zone => zoneOutline(zone)), ...routes.flatMap(route => route.points)]
       .filter(([x, y]) => x !== null && y !== null);
     if (!points.length) return null;
@@ -151,6 +151,7 @@ export class FleetMap {
     this.tiles.draw(context, view, colours.veil);
     this.demand.draw(context, view, scene.tasks, colours.heat);
     const texts = drawGrid(context, view, colours);
+    drawArea(context, view, scene.area, colours);
     drawZones(context, view, scene.zones, colours);
     drawWorks(context, view, scene.works, colours);
     drawRoutes(context, view, scene, colours);

@@ -34,6 +34,7 @@ export function readModel(past) {
   const {parts} = past || live, wall = past ? past.wall : live.clock.wall;
   const map = name => new Map(Object.entries(parts[name] || {}));
   const model = {wall, where: map('tasks'), statuses: map('statuses'), zones: parts.zones || [],
+    area: parts.fence_area || [],
     lists: new Map(), waits: new Map(), turns: new Map(), times: map('times'), works: map('works'), origin: parts.origin || null,
     frame: parts.origin ? frameOf(parts.origin) : null, over: !past && Boolean(live.clock.ended)};
   const states = map('uavs'), authorities = map('authority');

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from uav_task_alloc.checks import check_number, check_polygon, check_ros_name
+from uav_task_alloc.checks import check_number, check_ros_name
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.fence_area import area_corners, degrees_of
 from uav_task_alloc.geometry.frames import Origin, to_enu
-from uav_task_alloc.geometry.polygon import signed_area
 from uav_task_alloc.mavlink.fence.rally import RallyPoint
 from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig
@@ -23,7 +23,6 @@ _MOST = 1e6  # of any of them
 
 
 _HIGHEST_RALLY = 5000.0  # [m]
-_MOST_CORNERS = 20  # of the area of a fence
 
 
 def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
@@ -62,16 +61,8 @@ def to_fence_area(entries: Iterable[str], origin: Origin) -> FenceShape | None:
     Raises:
         InvalidValue: an entry has another form, or the polygon is not simple.
     """
-    places = [_degrees('fence_area', entry) for entry in entries]
-    if not places:
-        return None
-    if len(places) > _MOST_CORNERS:
-        raise InvalidValue('fence_area', len(places), f'at most {_MOST_CORNERS} corners')
-    corners = tuple((x, y) for x, y, _ in (
-        to_enu(origin, *place, origin.altitude_amsl) for place in places))
-    corners = check_polygon('fence_area', corners)
-    return FenceShape('', corners=corners if signed_area(corners) > 0.0 else corners[::-1],
-                      inclusion=True)
+    corners = area_corners(entries, origin)
+    return FenceShape('', corners=corners, inclusion=True) if corners else None
 
 
 def to_rally_points(entries: Iterable[str], origin: Origin,
@@ -93,7 +84,7 @@ def to_rally_points(entries: Iterable[str], origin: Origin,
     for entry in entries:
         place, _, end = entry.rpartition(',')
         has_height = entry.count(',') == 2
-        latitude, longitude = _degrees('rally_points', place if has_height else entry)
+        latitude, longitude = degrees_of('rally_points', place if has_height else entry)
         try:
             above = float(end) if has_height else height
         except ValueError:
@@ -105,17 +96,6 @@ def to_rally_points(entries: Iterable[str], origin: Origin,
         points.append(RallyPoint(latitude, longitude, above, to_enu(
             origin, latitude, longitude, origin.altitude_amsl)))
     return tuple(points)
-
-
-def _degrees(name: str, entry: str) -> tuple[float, float]:
-    """Latitude and longitude of an entry; raises InvalidValue."""
-    try:
-        latitude, longitude = map(float, entry.split(','))
-    except ValueError:
-        latitude = longitude = math.nan
-    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
-        raise InvalidValue(name, entry, '`LATITUDE,LONGITUDE` in degrees')
-    return latitude, longitude
 
 
 def to_gcs_config(params: BridgeParams) -> GcsConfig:

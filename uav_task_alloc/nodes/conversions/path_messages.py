@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The remaining path of a UAV: as points, and as a nav_msgs/Path."""
+"""The remaining path of a UAV, and the area that all stay in, as messages of other packages."""
 from __future__ import annotations
 
 import math
 from itertools import pairwise
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point32, PolygonStamped, PoseStamped
 from nav_msgs.msg import Path
 
 from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.state.fleet import UavRecord
+from uav_task_alloc.geometry.fence_area import AreaCorners
 from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Point
 from uav_task_alloc.nodes.conversions.messages import header, to_point
@@ -61,3 +62,18 @@ def path_message(uav_list: UavList, uav: UavRecord | None) -> Path:
         pose.pose.orientation.w = math.cos(yaw / 2.0)
         path.poses.append(pose)
     return path
+
+
+def area_message(corners: AreaCorners, now: float) -> PolygonStamped:
+    """Return the area that plans stay in.
+
+    Args:
+        corners: (east, north) [m]; () where there is none.
+        now: [s].
+
+    Returns:
+        For the topic `fence_area`.
+    """
+    message = PolygonStamped(header=header(now))
+    message.polygon.points = [Point32(x=x, y=y) for x, y in corners]
+    return message

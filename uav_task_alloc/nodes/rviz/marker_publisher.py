@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from geometry_msgs.msg import PolygonStamped
 from nav_msgs.msg import Path
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -14,9 +15,10 @@ from uav_task_alloc.allocator.records import Outbox
 from uav_task_alloc.allocator.replanning.plan_diff import changed_tasks
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.fence_area import AreaCorners
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.nodes.conversions.messages import LATCHED
-from uav_task_alloc.nodes.conversions.path_messages import path_message
+from uav_task_alloc.nodes.conversions.path_messages import area_message, path_message
 from uav_task_alloc.nodes.ros.clock_watch import steady_clock
 from uav_task_alloc.nodes.ros.topic_names import PATH, check_topic
 from uav_task_alloc.nodes.rviz.markers import MarkerScene, markers
@@ -30,19 +32,23 @@ class MarkerPublisher:
     """Publishes what RViz draws of the world.
 
     Publishes:
-        `allocation_markers` (MarkerArray) and `<uav_id>/path` (nav_msgs/Path); latched.
+        `allocation_markers` (MarkerArray), `<uav_id>/path` (nav_msgs/Path) and `fence_area`
+        (PolygonStamped, without points where there is none); latched.
 
     Args:
         node: publishes.
         world: is read at each publication.
+        area: corners of `fence_area` [m].
 
     Arguments of methods:
         outbox: what the allocator wants published.
         now: [s] steady clock.
     """
 
-    def __init__(self, node: Node, world: World) -> None:
+    def __init__(self, node: Node, world: World, area: AreaCorners = ()) -> None:
         self.node, self.world = node, world
+        self.area_publisher = node.create_publisher(PolygonStamped, 'fence_area', LATCHED)
+        self.area_publisher.publish(area_message(area, node.get_clock().now().nanoseconds * 1e-9))
         self.publisher = node.create_publisher(MarkerArray, 'allocation_markers', LATCHED)
         self.paths: dict[str, Publisher[Path]] = {}
         self.unpublished_paths: set[str] = set()  # UAVs
@@ -61,6 +67,7 @@ class MarkerPublisher:
         for publisher in self.paths.values():
             self.node.destroy_publisher(publisher)
         self.node.destroy_publisher(self.publisher)
+        self.node.destroy_publisher(self.area_publisher)
 
     def update(self, outbox: Outbox) -> None:
         """Take what the allocator publishes; nothing is converted here. O(lists)."""
