@@ -24,7 +24,7 @@ USED_KEYS = {  # values of a zone by its shape, beside id, shape and margin
     Shape.POLYGON: ('vertices', 'z_min', 'z_max')}
 _DIMENSIONS = ('center', 'radius', 'z_min', 'z_max', 'vertices')
 
-OUTSIDE_AREA = 'outside of fence_area'  # ids of the allocator's own zones begin with it
+OUTSIDE_AREA = 'outside of fence_area'  # ids of zones that cover it begin so
 
 
 @dataclass(frozen=True, slots=True)

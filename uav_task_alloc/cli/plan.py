@@ -99,9 +99,9 @@ def _load_kernels(loaded: Scenario, solver: str, search: bool = True) -> None:
     from uav_task_alloc.solver.solve import load_kernels  # imports numba
     from uav_task_alloc.solver.timed.solve import SOLVER_NAME, load_timed_kernels
     if not has_times(loaded):
-        load_kernels(solver, bool(loaded.zones), search)
+        load_kernels(solver, bool(loaded.no_fly_zones()), search)
     elif solver == SOLVER_NAME:  # `plan` refuses others
-        load_timed_kernels(bool(loaded.zones), search,
+        load_timed_kernels(bool(loaded.no_fly_zones()), search,
                            any(timed.task.path for timed in loaded.tasks))
 
 
@@ -210,7 +210,7 @@ def solve_scenario(loaded: Scenario, args: argparse.Namespace, stop: Callable[[]
     """Plan all tasks of a scenario around all its zones."""
     from uav_task_alloc.solver.solve import plan  # imports numba
     return plan([uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
-                [timed.zone for timed in loaded.zones], budget=args.budget, solver=args.solver,
+                loaded.no_fly_zones(), budget=args.budget, solver=args.solver,
                 seed=loaded.seed, route_end=loaded.route_end,
                 objective=loaded.objective or 'distance',
                 trips=loaded.trips, clearance=loaded.clearance,
@@ -252,7 +252,7 @@ def stops_text(result: Plan, uav: str, kinds: dict[str, str]) -> str:
 def start_warnings(loaded: Scenario) -> list[str]:
     """A line for each UAV that starts, or whose home is, inside an enlarged zone."""
     from uav_task_alloc.geometry.zones import zones_around  # imports numba
-    zones, lines = [timed.zone for timed in loaded.zones], []
+    zones, lines = loaded.no_fly_zones(), []
     for uav in loaded.uavs:
         around = zones_around(uav.position, zones, loaded.clearance)
         if around:
@@ -291,7 +291,8 @@ def write_outputs(loaded: Scenario, result: Plan, args: argparse.Namespace) -> N
             with naming(option, path):
                 getattr(plots, name)(
                     [uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
-                    [timed.zone for timed in loaded.zones], result, path)
+                    [timed.zone for timed in loaded.zones], result, path,
+                    fence_area=loaded.fence_area)
     if args.map and args.map.suffix.lower() == '.plan':
         from uav_task_alloc.map_files.write_plan import plan_document
         with naming('--map', args.map):
@@ -327,5 +328,7 @@ def missions_text(loaded: Scenario, result: Plan, folder: Path) -> str:
         if mission.unfenced:
             line += ('; no fence around ' + ', '.join(zone.id for zone in mission.unfenced)
                      + ', which the route or its straight return leg passes over or under')
+        if loaded.fence_area and not mission.area:
+            line += '; no fence_area, which its straight return leg leaves'
         lines.append(line)
     return '\n'.join(lines)

@@ -29,7 +29,7 @@ def with_pieces(loaded: Scenario, terrain: Terrain | None = None) -> Scenario:
         InvalidValue: there would be too many pieces, or the ground is not known.
         TerrainError: the terrain does not reach as far.
     """
-    zones = [timed.zone for timed in loaded.zones]
+    zones = loaded.no_fly_zones()
     return replace(loaded, tasks=tuple(
         TimedTask(timed.at, piece, timed.work) for timed in loaded.tasks for piece in (
             pieces_of(timed.work, zones, loaded.clearance, terrain) if timed.work

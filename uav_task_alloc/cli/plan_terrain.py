@@ -83,7 +83,7 @@ class _Zones:
     """The zones of a scenario, as legs over terrain ask for them."""
 
     def __init__(self, loaded: Scenario) -> None:
-        self._loaded, self._zones = loaded, [timed.zone for timed in loaded.zones]
+        self._loaded, self._zones = loaded, loaded.no_fly_zones()
 
     def way_around(self, a: Point, b: Point, low: float) -> tuple[Point, ...] | None:
         """Return the points of the shortest way around the zones."""

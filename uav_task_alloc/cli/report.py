@@ -15,6 +15,7 @@ from uav_task_alloc.cli.options import OptionParser
 from uav_task_alloc.cli.outputs import MAP_SUFFIXES, check_file, check_installed, naming
 from uav_task_alloc.cli.progress import log_line
 from uav_task_alloc.errors import AllocError, InvalidValue, damage
+from uav_task_alloc.geometry.fence_area import zones_outside
 from uav_task_alloc.map_files.write import flight_shapes, write_map
 from uav_task_alloc.record.ground_truth import (
     TRUTH_FILE,
@@ -26,7 +27,7 @@ from uav_task_alloc.record.ground_truth import (
 )
 from uav_task_alloc.record.piece_passes import piece_passes, served
 from uav_task_alloc.record.record_file import RECORD_FILE, unfinished
-from uav_task_alloc.record.reported import FINAL_STATES
+from uav_task_alloc.record.reported import FINAL_STATES, ZoneInterval
 from uav_task_alloc.record.run_state import RunState
 
 Summary = dict[str, Any]
@@ -57,7 +58,8 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
     names = {kind: sorted(name for name, its_fate in fates.items() if its_fate == kind)
              for kind in ('completed', 'unassigned', 'cancelled', 'lost')}
     twice = sorted(name for name, items in {**reached, **passes}.items() if len(items) > 1)
-    entries = zone_entries(truth, state.zones)
+    entries = zone_entries(truth, [*state.zones, *(
+        ZoneInterval(zone, -math.inf) for zone in zones_outside(state.fence_area))])
     times = [solve.milliseconds for solve in state.solves[1:]]  # the first plan is no re-plan
     replans = len(state.replans())
     return {

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from uav_task_alloc.checks import check_polygon
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.geometry.polygon import XY, signed_area
+from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.zone_codec import OUTSIDE_AREA
 
 _MOST_CORNERS = 20
+_REACH = 1e6  # [m] from the area: farther than any UAV would fly around its outside
 AreaCorners = tuple[XY, ...]  # [m]
 
 
@@ -31,11 +34,38 @@ def area_corners(entries: Iterable[str], origin: Origin) -> AreaCorners:
     places = [degrees_of('fence_area', entry) for entry in entries]
     if not places:
         return ()
-    if len(places) > _MOST_CORNERS:
-        raise InvalidValue('fence_area', len(places), f'at most {_MOST_CORNERS} corners')
-    corners = check_polygon('fence_area', [
-        to_enu(origin, *place, origin.altitude_amsl)[:2] for place in places])
-    return corners if signed_area(corners) > 0.0 else corners[::-1]
+    return check_fence_area([to_enu(origin, *place, origin.altitude_amsl)[:2] for place in places])
+
+
+def check_fence_area(corners: Sequence[XY]) -> AreaCorners:
+    """Check the corners of an area.
+
+    Args:
+        corners: (east, north) [m], either way round.
+
+    Returns:
+        The same, counter-clockwise.
+
+    Raises:
+        InvalidValue: there are more than 20, or the polygon is not simple.
+    """
+    if len(corners) > _MOST_CORNERS:
+        raise InvalidValue('fence_area', len(corners), f'at most {_MOST_CORNERS} corners')
+    checked = check_polygon('fence_area', corners)
+    return checked if signed_area(checked) > 0.0 else checked[::-1]
+
+
+def zones_outside(corners: AreaCorners) -> tuple[ThreatZone, ...]:
+    """Return zones over all that is outside of the area that a fleet stays in.
+
+    Args:
+        corners: [m], counter-clockwise; () where there is no area.
+
+    Returns:
+        Two, west and east, at all heights; none where there is no area.
+    """
+    return tuple(ThreatZone.polygon(f'{OUTSIDE_AREA} ({side})', ring) for side, ring in zip(
+        ('west', 'east'), outside_rings(corners, _REACH), strict=True)) if corners else ()
 
 
 def degrees_of(name: str, entry: str) -> tuple[float, float]:

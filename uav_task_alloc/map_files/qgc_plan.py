@@ -102,7 +102,7 @@ def why_no_task(command: int) -> str:
 
 def _read_circle(circle: dict[str, Any], where: str, number: int, read: MapFile) -> None:
     if circle.get('inclusion'):
-        read.left_out.append(f'{where}: it includes: expected an excluding one, see fence_area')
+        read.left_out.append(f'{where}: it includes: expected an excluding one, or a polygon')
         return
     latitude, longitude = circle['circle']['center']
     own = own_values(where, circle)
@@ -113,11 +113,8 @@ def _read_circle(circle: dict[str, Any], where: str, number: int, read: MapFile)
 
 
 def _read_polygon(polygon: dict[str, Any], where: str, number: int, read: MapFile) -> None:
-    if polygon.get('inclusion'):
-        read.left_out.append(f'{where}: it includes: expected an excluding one, see fence_area')
-        return
     ring: list[Place] = [check_place(where, (longitude, latitude))
                          for latitude, longitude in polygon['polygon']]
-    own = own_values(where, polygon)
+    own = {'kind': 'fence_area'} if polygon.get('inclusion') else own_values(where, polygon)
     read.elements.append(Element(where, str(own.pop('id', f'polygon_{number}')), 'polygon',
                                  open_ring(where, ring), properties=own, zone=True))

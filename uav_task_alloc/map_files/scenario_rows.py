@@ -38,8 +38,9 @@ _KEYS = {'tasks': TASK.keys() - _PLACE_KEYS - _OWN_KEYS,
 _LISTS = 'required_capabilities', 'allowed_uavs', 'capabilities'
 _NESTED = 'actions', 'camera'  # JSON values, or texts of them
 _KINDS = {'task': 'tasks', 'zone': 'zones', 'no_fly_zone': 'zones', 'uav': 'uavs',
-          **dict.fromkeys(_WORK_KEYS, 'tasks')}
-_GEOMETRIES = {'point': 'point', 'orbit': 'point', 'line': 'line', 'area': 'polygon'}
+          **dict.fromkeys(_WORK_KEYS, 'tasks'), 'fence_area': 'fence_area'}
+_GEOMETRIES = {'point': 'point', 'orbit': 'point', 'line': 'line', 'area': 'polygon',
+               'fence_area': 'polygon'}
 _HINTED = {'value', 'service_time', 'latest'}  # keys for which a hint names other words
 _RESULTS = 'route', 'track'  # written by map_files.write
 _ROW = re.compile(r':\d+: (scenario\.(tasks|zones|uavs)\[(\d+)\].*)', re.DOTALL)
@@ -160,6 +161,8 @@ class _Rows:
                               'flights are written')
         elif kind == 'zones':
             self._add_zone(element)
+        elif kind == 'fence_area':
+            self._set_area(element)
         elif kind == 'uavs' and element.geometry == 'point':
             self._add_point('uavs', element, element.places[0], element.name, 0.0)
         elif kind == 'tasks' and element.geometry == 'point':
@@ -279,6 +282,16 @@ class _Rows:
             if element.properties.get('shape') == 'hemisphere':
                 row['altitude'] = self._altitude(element, place, 0.0)
         self._append('zones', element, element.name, row)
+
+    def _set_area(self, element: Element) -> None:
+        """The area that plans stay in: the first one, or that of the fleet."""
+        if self.document.get('fence_area'):
+            self.notes.append(f'{element.where}: a second fence_area: expected one')
+            return
+        if element.holes:
+            self.notes.append(f'{element.where}: the holes of the fence_area are closed')
+        self.document['fence_area'] = _corners(element.places)
+        self.added += 1
 
     def _append(self, kind: str, element: Element, name: str, row: dict[str, Any]) -> None:
         used = _KEYS[kind] | (_WORK_KEYS[row.get('kind', 'point')] if kind == 'tasks' else set())

@@ -11,6 +11,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
+from uav_task_alloc.geometry.polygon import XY
 from uav_task_alloc.model import Plan, Point, Shape, ThreatZone
 from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import RED, STATE_COLOURS, uav_colour
@@ -20,6 +21,7 @@ from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 
 _CORNERS = 48  # of a circle; they are outside of it
 _DIGITS = 9, 9, 3  # of degrees and metres
+_FENCE = 'fence'  # the folder whose polygons are not filled
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,7 @@ class MapShape:
     """A point, line or polygon of a map."""
 
     name: str
-    folder: str  # tasks | zones | routes | tracks
+    folder: str  # tasks | fence | zones | routes | tracks
     geometry: str  # Point | LineString | Polygon
     points: tuple[Point, ...]  # [m] ENU; of a polygon its open outer ring
     properties: dict[str, Any] = field(default_factory=dict)
@@ -66,7 +68,14 @@ def plan_shapes(scenario: Scenario, plan: Plan) -> list[MapShape]:
         'kind': 'route', 'metres': round(plan.route(uav.id).distance, 1)},
         _colours(scenario.uavs)[uav.id])
         for uav in scenario.uavs if len(points := route_points(uav.uav, plan, known)) > 1]
-    return [*tasks, *(zone_shape(timed.zone) for timed in scenario.zones), *routes]
+    return [*tasks, *_area_shapes(scenario.fence_area),
+            *(zone_shape(timed.zone) for timed in scenario.zones), *routes]
+
+
+def _area_shapes(corners: Sequence[XY]) -> list[MapShape]:
+    points = tuple((x, y, 0.0) for x, y in corners)
+    return [MapShape('fence_area', _FENCE, 'Polygon', points, {'kind': 'fence_area'},
+                     level=False)] if points else []
 
 
 def _colours(uavs: Sequence[ScenarioUav]) -> dict[str, str]:
@@ -112,7 +121,7 @@ def flight_shapes(run: RunState, tracks: Mapping[str, Sequence[TrueSample]]) -> 
             'kind': 'task', 'altitude': task.position[2], **row},
             STATE_COLOURS.get(row['state'], RED)))
     zones = dict.fromkeys(interval.zone for interval in run.zones)
-    return [*tasks, *map(zone_shape, zones), *(
+    return [*tasks, *_area_shapes(run.fence_area), *map(zone_shape, zones), *(
         MapShape(uav, 'tracks', 'LineString', tuple(sample.point for sample in track),
                  {'kind': 'track'}, uav_colour(number))
         for number, (uav, track) in enumerate(sorted(tracks.items())) if len(track) > 1)]
@@ -174,7 +183,8 @@ def _placemark(folder: ElementTree.Element, shape: MapShape, places: list[list[f
     ElementTree.SubElement(mark, 'name').text = shape.name
     style = ElementTree.SubElement(mark, 'Style')
     red, green, blue = shape.colour[1:3], shape.colour[3:5], shape.colour[5:7]
-    for tag, opacity in (('IconStyle', 'ff'), ('LineStyle', 'ff'), ('PolyStyle', '60')):
+    for tag, opacity in (('IconStyle', 'ff'), ('LineStyle', 'ff'),
+                         ('PolyStyle', '00' if shape.folder == _FENCE else '60')):
         colour = ElementTree.SubElement(ElementTree.SubElement(style, tag), 'color')
         colour.text = f'{opacity}{blue}{green}{red}'  # aabbggrr
     data = ElementTree.SubElement(mark, 'ExtendedData')

@@ -51,6 +51,9 @@ def plan_document(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
             notes.append(f'task {work.task.id}: a survey has no holes: they are not written')
         items.append({**_ITEMS[work.kind](work, origin, len(items) + 1), OWN_KEY: _own(timed)})
     fences = [_fence(timed, origin) for timed in scenario.zones]
+    if scenario.fence_area:
+        corners = tuple((x, y, 0.0) for x, y in scenario.fence_area)
+        fences.append({'polygon': _ring(origin, corners), 'inclusion': True, 'version': 1})
     home = [origin.latitude, origin.longitude, origin.altitude_amsl]
     return {
         'fileType': 'Plan', 'version': 1, 'groundStation': 'QGroundControl',

@@ -8,6 +8,7 @@ from pathlib import Path
 from matplotlib.lines import Line2D
 
 import uav_task_alloc.plots.style as style
+from uav_task_alloc.geometry.fence_area import AreaCorners
 from uav_task_alloc.model import Plan, Point, Task, ThreatZone, Uav
 from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import RED, uav_colour
@@ -17,7 +18,7 @@ _RESOLVED = '#202020'  # of the mark of a conflict
 
 
 def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[ThreatZone],
-              plan: Plan, png: str | Path) -> None:
+              plan: Plan, png: str | Path, fence_area: AreaCorners = ()) -> None:
     """Draw a map of a plan.
 
     Args:
@@ -26,11 +27,13 @@ def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Threat
         zones: to draw.
         plan: routes by UAV, unassigned tasks.
         png: the file; its suffix selects the format.
+        fence_area: to draw [m].
 
     Raises:
         OSError: the file cannot be written.
     """
     figure = MapFigure((task.position for task in tasks), len(tasks))
+    figure.fence_area(fence_area)
     add_plan(figure, uavs, tasks, zones, plan)
     figure.finish(plan_title(plan, len(tasks)), legend_handles(uavs, tasks, plan), png)
 

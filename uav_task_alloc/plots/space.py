@@ -16,6 +16,8 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.typing import NDArray
 
 import uav_task_alloc.plots.style as style
+from uav_task_alloc.geometry.fence_area import AreaCorners
+from uav_task_alloc.geometry.polygon import edges
 from uav_task_alloc.model import Plan, Point, Shape, Task, ThreatZone, Uav
 from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import DARK_RED, RED, uav_colour
@@ -40,7 +42,8 @@ TextLabel = tuple[str, Point, bool, str]  # text, position, bold, colour
 
 
 def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[ThreatZone],
-                 plan: Plan, png: str | Path, note: str = '') -> None:
+                 plan: Plan, png: str | Path, note: str = '',
+                 fence_area: AreaCorners = ()) -> None:
     """Draw a plan seen from south-east and above; unbounded zones are cut.
 
     Args:
@@ -50,6 +53,7 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
         plan: routes by UAV, unassigned tasks.
         png: the file; its suffix selects the format.
         note: text above the legend.
+        fence_area: to draw on the ground [m].
 
     Raises:
         OSError: the file cannot be written.
@@ -58,9 +62,11 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
     known = {task.id: task for task in tasks}
     routes = [route_points(uav, plan, known) for uav in uavs]
     points = [*positions.values(), *itertools.chain.from_iterable(routes)]
-    low, high = box_limits(points, zones)
+    low, high = box_limits([*points, *((x, y, 0.0) for x, y in fence_area)], zones)
     figure = Figure(figsize=style.SIZE, dpi=style.DPI)
     axes = figure.add_axes(_AXES, projection='3d', computed_zorder=False)
+    for (ax, ay), (bx, by) in edges(fence_area):
+        axes.plot([ax, bx], [ay, by], [low[2], low[2]], '--', color=RED, lw=2.0)
     names = [_draw_zone(axes, zone, low[2], high[2]) for zone in zones]
     shows_names = len(tasks) <= style.MAX_NAMED_TASKS
     size = 10.0 if shows_names else 5.0

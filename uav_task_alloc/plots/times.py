@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 import uav_task_alloc.plots.style as style
+from uav_task_alloc.geometry.fence_area import AreaCorners
 from uav_task_alloc.model import Plan, Task, ThreatZone, Uav, turned_tasks
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
@@ -22,7 +23,7 @@ _WINDOW, _FLIGHT, _WAIT = '#d9d9d9', '#9a9a9a', '///'
 
 
 def draw_plan_times(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[ThreatZone],
-                    plan: Plan, png: str | Path) -> None:
+                    plan: Plan, png: str | Path, fence_area: AreaCorners = ()) -> None:
     """Draw the map of a plan and, beside it, when each task is flown to and served.
 
     Args:
@@ -31,12 +32,14 @@ def draw_plan_times(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[
         zones: to draw.
         plan: routes by UAV, times, unassigned tasks.
         png: the file; its suffix selects the format.
+        fence_area: to draw [m].
 
     Raises:
         OSError: the file cannot be written.
     """
     positions = [task.position for task in tasks]
     figure = MapFigure(positions, len(tasks), beside=True)
+    figure.fence_area(fence_area)
     add_plan(figure, uavs, tasks, zones, plan)
     axes = figure.beside
     assert axes is not None

@@ -59,7 +59,7 @@ class SolveRecord:
 class ZoneInterval:
     """A zone and the time during which it was in force."""
 
-    zone: ThreatZone
+    zone: ThreatZone  # as it was then
     since: float  # [unix s]
     until: float = math.inf  # [unix s]
 

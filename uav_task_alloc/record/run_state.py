@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
+from uav_task_alloc.geometry.fence_area import AreaCorners
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point, ThreatZone
@@ -78,7 +79,7 @@ class RunState:
     rate: float = 1.0  # scenario seconds in a second of real time
     simulated: bool = False  # `wall` is the time of /clock
     origin: Origin | None = None  # of the ENU frame; None: not known yet
-    fence_area: list[tuple[float, float]] = field(default_factory=list)  # corners [m] or none
+    fence_area: AreaCorners = ()  # [m]; (): none
     measured: bool = True  # `rate` is that of the vehicles' clocks, as no one stated it
     clock_rates: dict[str, float] = field(default_factory=dict)  # of the vehicles, by UAV
     first: float = math.inf  # [unix s] of the first line
@@ -113,7 +114,7 @@ class RunState:
 
     def on_fence_area(self, line: Line) -> None:
         """The area that plans stay in."""
-        self.fence_area = [(x, y) for x, y in line['corners']]
+        self.fence_area = tuple((x, y) for x, y in line['corners'])
 
     def on_announcement(self, line: Line) -> None:
         """ADD, UPDATE or CANCEL of tasks."""

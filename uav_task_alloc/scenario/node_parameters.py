@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.frames import to_geodetic_batch
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.params import MAX_RANGE, BridgeParams, PlayerParams
 from uav_task_alloc.scenario.schema import SEPARATION
@@ -33,14 +34,18 @@ def fleet_parameters(played: Scenario) -> dict[str, Parameters]:
     origin: Parameters = {'origin.latitude': played.origin.latitude,
                           'origin.longitude': played.origin.longitude,
                           'origin.altitude_amsl': played.origin.altitude_amsl}
+    area: Parameters = {'fence_area': [
+        '{:.9f},{:.9f}'.format(*place[:2]) for place in to_geodetic_batch(
+            played.origin, [(x, y, 0.0) for x, y in played.fence_area]).tolist()]
+    } if played.fence_area else {}
     capable = [f'{uav.id}:{_capabilities(uav)}' for uav in played.uavs if uav.capabilities]
     return {
-        'allocator': {**origin, 'route_end': played.route_end, 'seed': played.seed % SEEDS,
+        'allocator': {**origin, **area, 'route_end': played.route_end, 'seed': played.seed % SEEDS,
                       'clearance': played.clearance, 'altitude_min': played.altitude_min,
                       'altitude_max': played.altitude_max,
                       'default_range': min(map(_range, played.uavs)),
                       'trips': played.trips, **_objective(played), **_separation(played)},
-        'mavlink_bridge': {**origin,
+        'mavlink_bridge': {**origin, **area,
                            'full_ranges': [f'{uav.id}:{_range(uav)}' for uav in played.uavs],
                            'system_ids': [uav.system_id for uav in played.uavs],
                            'uav_id_pattern': id_pattern(played),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from uav_task_alloc.errors import InvalidValue, ScenarioError
+from uav_task_alloc.geometry.fence_area import check_fence_area, zones_outside
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import Point, Shape, Task
+from uav_task_alloc.model import Point, Shape, Task, ThreatZone
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.scenario.checked_yaml import YamlRow, compose, read_row, refusal
 from uav_task_alloc.scenario.generate import draw_points
@@ -89,10 +90,13 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
     _unique(root['uavs'], 'system_id', [uav.system_id for uav in uavs])
     zones = tuple(_zone(row, origin) for row in root['zones'])
     _unique(root['zones'], 'id', [timed.zone.id for timed in zones])
+    area = _valid(root, lambda: check_fence_area(_enu_corners(root['fence_area'], origin))
+                  if root['fence_area'] else ())
     tasks = [_task(row, origin, [uav.id for uav in uavs]) for row in root['tasks']]
     _unique(root['tasks'], 'id', [timed.task.id for timed in tasks])
     if root['arrivals'] is not None:
-        tasks += _arrivals(root['arrivals'], zones, tasks, root['seed'])
+        tasks += _arrivals(root['arrivals'], [*(timed.zone for timed in zones),
+                                              *zones_outside(area)], tasks, root['seed'])
     times = {timed.task.id: timed.at for timed in tasks}
     if not root['altitude_min'] < root['altitude_max']:
         raise root.refuse('altitude_min', f'less than altitude_max = {root["altitude_max"]:g}')
@@ -104,7 +108,7 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
                     root['altitude_max'], _objective(root['objective']), root['trips'],
                     ScenarioWind(**root['wind'].values) if root['wind'] else ScenarioWind(),
                     _separation(root['separation']),
-                    _orders(root['orders'], times, [uav.id for uav in uavs]))
+                    _orders(root['orders'], times, [uav.id for uav in uavs]), area)
 
 
 def _separation(given: YamlRow | None) -> Separation:
@@ -198,9 +202,13 @@ def _zonefrom_degrees(row: YamlRow, origin: Origin) -> None:
             if row[key] is None:
                 raise row.refuse(key, f'all of {", ".join(geodetic)}')
         row.values['center'] = from_degrees(row, origin)
-    row.values['vertices'] = row['vertices'] and tuple(
-        from_degrees(corner, origin)[:2] if isinstance(corner, YamlRow) else corner
-        for corner in row['vertices'])
+    row.values['vertices'] = row['vertices'] and _enu_corners(row['vertices'], origin)
+
+
+def _enu_corners(corners: Iterable[Any], origin: Origin) -> tuple[tuple[float, float], ...]:
+    """Corners in metres or degrees as (east, north) [m]."""
+    return tuple(from_degrees(corner, origin)[:2] if isinstance(corner, YamlRow) else corner
+                 for corner in corners)
 
 
 def _cancel(row: YamlRow, times: dict[str, float]) -> Cancel:
@@ -229,7 +237,7 @@ def _orders(rows: Iterable[YamlRow], times: dict[str, float],
     return tuple(sorted((TimedOrder(**row.values) for row in rows), key=lambda order: order.at))
 
 
-def _arrivals(row: YamlRow, zones: Iterable[TimedZone], tasks: list[TimedTask],
+def _arrivals(row: YamlRow, zones: Sequence[ThreatZone], tasks: list[TimedTask],
               seed: int) -> list[TimedTask]:
     first, last = row['between']
     low, high = row['area']
@@ -239,7 +247,7 @@ def _arrivals(row: YamlRow, zones: Iterable[TimedZone], tasks: list[TimedTask],
         raise row.refuse('area', 'the lower corner first')
     rng = np.random.default_rng(seed)
     times = sorted(round(float(t), 1) for t in rng.uniform(first, last, row['count']))
-    points = draw_points(rng, row['count'], low, high, [timed.zone for timed in zones])
+    points = draw_points(rng, row['count'], low, high, zones)
     if len(points) < row['count']:
         raise row.refuse('area', 'a box with room outside the zones')
     ids = [f'{row["prefix"]}{i:02d}' for i in range(1, row['count'] + 1)]

@@ -56,6 +56,10 @@ GEODETIC: KeyTable = {
 }
 _GEODETIC_CORNER: KeyTable = {key: GEODETIC[key] for key in ('latitude', 'longitude')}
 
+_CORNERS = list_of(or_mapping(
+    CORNER, _GEODETIC_CORNER, 'two numbers [x, y], or a mapping with latitude, longitude'),
+    'a list of at least 3 corners [x, y] or {latitude, longitude}', 3)
+
 UAV: KeyTable = {
     'id': Key(ROS_NAME, 'name of the UAV and namespace of its topics'),
     'system_id': Key(whole_number(1, 255), 'MAVLink system id; default: its position in the list'
@@ -148,9 +152,7 @@ ZONE: KeyTable = {
     'longitude': replace(_LONGITUDE, text='[deg] WGS84 of its center; hemisphere and cylinder'),
     'altitude': replace(_ALTITUDE, text='[m] above the origin, of its center; hemisphere only'),
     'radius': Key(POSITIVE, '[m]; hemisphere and cylinder', None),
-    'vertices': Key(list_of(or_mapping(
-        CORNER, _GEODETIC_CORNER, 'two numbers [x, y], or a mapping with latitude, longitude'),
-        'a list of at least 3 corners [x, y] or {latitude, longitude}', 3),
+    'vertices': Key(_CORNERS,
         '[m] ENU or degrees, a simple polygon; polygon only', None),
     'z_min': Key(number_value(infinite=True), '[m] lower limit; cylinder and polygon', -math.inf),
     'z_max': Key(number_value(infinite=True), '[m] upper limit; cylinder and polygon', math.inf),
@@ -203,6 +205,8 @@ SCENARIO: KeyTable = {
                         AllocatorParams.altitude_min),
     'altitude_max': Key(number_value(-1e5, 1e5), '[m] highest detour, above the origin',
                         AllocatorParams.altitude_max),
+    'fence_area': Key(_CORNERS, '[m] ENU or degrees, at most 20 corners of a simple polygon that '
+                      'no plan leaves; default: none', ()),
     'wind': Key(mapping(_WIND, 'a mapping with east, north, gusts'),
                 'in which simulated UAVs fly; `plan` ignores it; default: calm', None),
     'separation': Key(mapping(SEPARATION, 'a mapping with horizontal, vertical, time'),

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 
+from uav_task_alloc.geometry.fence_area import AreaCorners, zones_outside
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective
@@ -156,6 +157,7 @@ class Scenario:
     wind: ScenarioWind = ScenarioWind()  # of a simulated flight
     separation: Separation = field(default_factory=Separation)  # horizontal 0: none
     orders: tuple[TimedOrder, ...] = ()  # by `at`; `plan` ignores them
+    fence_area: AreaCorners = ()  # [m] that no plan leaves; (): none
 
     @property
     def duration(self) -> float:
@@ -166,6 +168,10 @@ class Scenario:
         times += [t for timed in self.zones for t in (timed.appears, timed.vanishes)
                   if math.isfinite(t)]
         return max(times, default=0.0)
+
+    def no_fly_zones(self) -> list[ThreatZone]:
+        """All zones of the file, at whatever time, and what is outside of `fence_area`."""
+        return [*(timed.zone for timed in self.zones), *zones_outside(self.fence_area)]
 
     def zones_at(self, at: float) -> tuple[ThreatZone, ...]:
         """All zones in force at a time [s]."""

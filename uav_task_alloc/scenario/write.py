@@ -45,6 +45,8 @@ def to_yaml(scenario: Scenario) -> str:
             'objective': scenario.objective if isinstance(scenario.objective, str)
             else asdict(scenario.objective)}),
         'trips': scenario.trips,
+        **({'fence_area': [list(corner) for corner in scenario.fence_area]}
+           if scenario.fence_area else {}),
         'wind': asdict(scenario.wind),
         **({'separation': {name: getattr(scenario.separation, name) for name in SEPARATION}}
            if scenario.separation.on else {}),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ground below tasks: heights above it become ENU heights; lower tasks are refused."""
+"""The ground of the fleet: heights above it, lower tasks, and the area that all stay in."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.fence_area import area_corners, zones_outside
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
@@ -116,3 +117,19 @@ def read_ground(params: AllocatorParams, origin: Origin) -> Terrain | None:
     terrain = read_terrain(Path(params.terrain), origin)
     terrain.above_ground([(0.0, 0.0, 0.0)])
     return terrain
+
+
+def area_zones(params: AllocatorParams) -> tuple[ThreatZone, ...]:
+    """Return the zones over all that is outside of `fence_area`.
+
+    Args:
+        params: with the origin.
+
+    Returns:
+        None where no area is given.
+
+    Raises:
+        InvalidValue: the area is invalid.
+    """
+    return zones_outside(area_corners(params.fence_area, Origin(
+        params.origin__latitude, params.origin__longitude, params.origin__altitude_amsl)))

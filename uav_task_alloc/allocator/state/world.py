@@ -21,10 +21,9 @@ from uav_task_alloc.allocator.state.admission import Admission
 from uav_task_alloc.allocator.state.announcements import Announcements
 from uav_task_alloc.allocator.state.callbacks import RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
-from uav_task_alloc.allocator.state.fence_walls import zones_outside
 from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord, jump_distance, replan_reasons
 from uav_task_alloc.allocator.state.flights import Flights
-from uav_task_alloc.allocator.state.ground import Ground
+from uav_task_alloc.allocator.state.ground import Ground, area_zones
 from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
 from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
 from uav_task_alloc.allocator.state.missed_completions import MissedCompletions
@@ -84,7 +83,7 @@ class World:
         # of the allocation; and the first one with the lists in force
         self.revision = self.plan_revision = saved.revision
         self.version, self.outbox, self.proposal = 0, Outbox(), saved.proposal
-        self.zones, self._outside = {each.id: each for each in saved.zones}, zones_outside(params)
+        self.zones, self._outside = {each.id: each for each in saved.zones}, area_zones(params)
         self.restart_hold = any(each.stops for each in saved.lists)  # no task changes its UAV
         self.kernels_ready = False  # compiled: checks of zones are fast
         self._paths: SafePaths | None = None

@@ -17,6 +17,7 @@ from urllib.parse import quote
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from uav_task_alloc.geometry.fence_area import AreaCorners, zones_outside
 from uav_task_alloc.geometry.frames import Origin, to_geodetic, to_geodetic_batch
 from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.mavlink.autopilots import ARDUPILOT, OFF_GROUND, PX4, Profile
@@ -51,6 +52,7 @@ class PlannedMission:
     origin: Origin
     items: tuple[Item, ...]  # without home; none where it has no task
     fences: tuple[ThreatZone, ...]  # that its path keeps out of at any height
+    area: AreaCorners  # [m] that its path stays in
     unfenced: tuple[ThreatZone, ...]  # that it passes over or under: a fence has no height
 
 
@@ -106,8 +108,11 @@ def planned_mission(scenario: Scenario, uav: ScenarioUav, route: Route,
     listed = list_for_route(route, known, reversed_ids)
     items = mission_items(_with_points_between(uav, profile, listed), profile.rules,
                           scenario.origin, uav.home, uav.cruise_speed)
-    fences, unfenced = _split_zones(_path(uav, listed), [timed.zone for timed in scenario.zones])
-    return PlannedMission(uav, scenario.origin, items, fences, unfenced)
+    path = _path(uav, listed)
+    fences, unfenced = _split_zones(path, [timed.zone for timed in scenario.zones])
+    area = scenario.fence_area
+    stays = path_is_clear(path, zones_outside(area))
+    return PlannedMission(uav, scenario.origin, items, fences, area if stays else (), unfenced)
 
 
 def list_for_route(route: Route, tasks: Mapping[str, Task],
@@ -170,8 +175,10 @@ def plan_file(mission: PlannedMission) -> dict[str, Any]:
             'version': 2,
             'circles': [_circle(zone, mission.origin) for zone in mission.fences
                         if zone.shape is not Shape.POLYGON],
-            'polygons': [_polygon(zone, mission.origin) for zone in mission.fences
-                         if zone.shape is Shape.POLYGON],
+            'polygons': [_polygon(mission.area, mission.origin, inclusion=True)
+                         ] * bool(mission.area) + [
+                _polygon(zone.vertices, mission.origin) for zone in mission.fences
+                if zone.shape is Shape.POLYGON],
         },
         'rallyPoints': {'version': 2, 'points': []},
     }
@@ -241,8 +248,8 @@ def _circle(zone: ThreatZone, origin: Origin) -> dict[str, Any]:
         'center': [round(latitude, 7), round(longitude, 7)], 'radius': zone.radius}}
 
 
-def _polygon(zone: ThreatZone, origin: Origin) -> dict[str, Any]:
-    corners = to_geodetic_batch(origin, [(x, y, 0.0) for x, y in zone.vertices])
-    return {'version': 1, 'inclusion': False,
+def _polygon(ring: AreaCorners, origin: Origin, inclusion: bool = False) -> dict[str, Any]:
+    corners = to_geodetic_batch(origin, [(x, y, 0.0) for x, y in ring])
+    return {'version': 1, 'inclusion': inclusion,
             'polygon': [[round(latitude, 7), round(longitude, 7)]
                         for latitude, longitude, _ in corners.tolist()]}
