@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from allocation import AllocatorDriver
 
+from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.records import UavReport
 
 JUMPS = [-900.0, -7.0, 60.0, 3600.0]
@@ -33,6 +34,23 @@ def test_a_wait_for_the_separation_lasts_as_long_and_is_sent_again(by):
     sent = driver.lists['a']
     assert sent.revision == revision + 1
     assert sent.stamp + sent.stops[0].start == pytest.approx(stamp + 90.0, abs=0.1)
+
+
+def test_a_list_whose_wait_was_over_before_the_clock_went_back_survives_a_restart():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0))
+    driver.settle()
+    each = driver.lists['a']
+    stop = replace(each.stops[0], begin_after=driver.now + 5.0)
+    driver.world.publish({'a': replace(each, stops=(stop,))}, driver.now)
+    driver.now += 60.0
+    driver.uav('a', 50.0, 0.0, 50.0)
+    jump(driver, -driver.now)
+    driver.core.nothing_written()
+    state = restored_state(driver.core.rows())
+    assert state.unreadable == []
+    assert [each.task_ids for each in state.lists] == [('t1',)]
 
 
 @pytest.mark.parametrize('by', JUMPS)

@@ -208,10 +208,10 @@ def shifted_list(each: UavList, by: float) -> UavList:
         by: [s] of the jump.
 
     Returns:
-        The list with its stamp and its waits moved by as much.
+        The list with its stamp and its waits moved by as much; none is before the clock began.
     """
     return replace(each, stamp=each.stamp + by, stops=tuple(
-        replace(stop, begin_after=stop.begin_after + by) if stop.begin_after else stop
+        replace(stop, begin_after=max(0.0, stop.begin_after + by)) if stop.begin_after else stop
         for stop in each.stops))
 
 
