@@ -5,6 +5,7 @@ import math
 import pytest
 from allocation import AllocatorDriver
 
+from uav_task_alloc import plan
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.allocator.status import health_warnings
 from uav_task_alloc.errors import InvalidValue
@@ -203,6 +204,36 @@ def test_a_battery_is_good_again_when_it_is_well_above_the_reserve():
         driver.uav('a', 0.0, 0.0, 50.0, battery=battery)
         low.append(driver.world.fleet.records['a'].low)
     assert low == [False, True, True, True, True, True, False, False]
+
+
+def test_a_payload_that_waits_for_a_uav_on_the_ground_is_planned_when_one_lands():
+    driver = AllocatorDriver(plan=plan, route_end='home')
+    able = {'home': (0.0, 0.0, 0.0), 'payload_capacity': 2.0}
+    driver.uav('a', 100.0, 0.0, 50.0, **able)
+    driver.add(Task('p', (100.0, 0.0, 30.0), payload=1.0))
+    driver.settle()
+    assert driver.state('p') == 'UNASSIGNED'
+    assert 'is in the air' in driver.reason('p')
+    driver.uav('a', 0.0, 0.0, 0.0, standby=True, **able)
+    driver.settle()
+    assert driver.route('a') == ('p',)
+    assert driver.solves[-1] == 'a is on the ground'
+    driver.uav('a', 0.0, 0.0, 20.0, **able)
+    driver.uav('a', 0.0, 0.0, 0.0, standby=True, **able)  # no task waits for that
+    assert driver.begin() is None
+
+
+def test_a_task_out_of_range_is_planned_when_a_uav_has_another_battery():
+    driver = AllocatorDriver(plan=plan, route_end='home')
+    home = {'home': (0.0, 0.0, 0.0), 'standby': True, 'full_range': 3000.0}
+    driver.uav('a', 0.0, 0.0, 0.0, range=1200.0, battery=0.4, **home)
+    driver.add(Task('far', (1000.0, 0.0, 30.0)))
+    driver.settle()
+    assert driver.state('far') == 'UNASSIGNED'
+    driver.uav('a', 0.0, 0.0, 0.0, range=3000.0, battery=1.0, **home)
+    driver.settle()
+    assert driver.route('a') == ('far',)
+    assert driver.solves[-1] == 'a has another battery'
 
 
 @pytest.mark.parametrize('battery', [None, 0.0])

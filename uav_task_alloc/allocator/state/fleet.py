@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from uav_task_alloc.allocator.records import UavReport
+from uav_task_alloc.allocator.records import TaskRecord, TaskState, UavReport
 from uav_task_alloc.allocator.state.orders import Orders
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.model import Point, Task, Uav
@@ -288,8 +288,9 @@ def may_fly(task: Task, failed_on: Iterable[str], uav: UavReport) -> bool:
             and task.required_capabilities <= uav.capabilities and uav.uav_id not in failed_on)
 
 
-def replan_reasons(before: UavRecord | None, after: UavRecord) -> list[str]:
-    """Return what in a new report requires a plan."""
+def replan_reasons(before: UavRecord | None, after: UavRecord,
+                   open_tasks: Callable[[], Iterable[TaskRecord]]) -> list[str]:
+    """Return what in a new report requires a plan; `open_tasks` returns those still to be done."""
     report, reasons = after.report, []
     if before is None or before.silent:
         reasons += ['reports again' if before else 'reports'] if report.available else []
@@ -302,7 +303,21 @@ def replan_reasons(before: UavRecord | None, after: UavRecord) -> list[str]:
     if after.low != (before is not None and before.low):
         reasons += [f'battery {100.0 * (after.battery or 0.0):.0f} %: ' + (
             'below the reserve, it returns home' if after.low else 'above the reserve again')]
-    return reasons
+    if before is None or reasons:
+        return reasons
+    can_more = _can_more(before, after)
+    waiting = can_more and any(each.state is TaskState.UNASSIGNED for each in open_tasks())
+    return [can_more] if waiting else []
+
+
+def _can_more(before: UavRecord, after: UavRecord) -> str:
+    """Why a UAV may be able to fly tasks that it could not fly before; '' where it is not."""
+    if after.report.standby and not before.report.standby:
+        return 'is on the ground'  # it takes payloads on
+    if after.battery is not None and before.battery is not None and (
+            after.battery >= before.battery + _RECHARGED):
+        return 'has another battery'
+    return ''
 
 
 def jump_distance(before: UavRecord | None, report: UavReport, now: float, speed: float,

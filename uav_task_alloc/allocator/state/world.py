@@ -149,7 +149,7 @@ class World:
         before = self.fleet.update(report, now, self.params.battery_reserve)
         self.flights.update(report, stamp)
         self._missed.observe(report, stamp)
-        for reason in replan_reasons(before, self.fleet.records[uav_id]):
+        for reason in replan_reasons(before, self.fleet.records[uav_id], self.tasks.open):
             self.note(f'{uav_id} {reason}')
             self.request_replan(f'{uav_id} {reason}', now)
         self._check_jump(before, report, now)
