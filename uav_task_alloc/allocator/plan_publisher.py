@@ -2,6 +2,7 @@
 """Puts lists of plans in force, and publishes what is in force as allocations."""
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -38,6 +39,7 @@ class PlanPublisher:
         self._together: tuple[str, ...] = ()  # UAVs that the lists in force do not keep apart
         self._predictions = Predictions(world, now)
         self.left_out: dict[str, str] = {}  # task id -> reason
+        self._passes = math.inf  # [s] published clock: the next latest of these passes
 
     def due(self, now: float) -> bool:
         """Return whether lists that were deferred may be published now."""
@@ -62,6 +64,7 @@ class PlanPublisher:
         self._together = built.together
         self.left_out = {task_id: world.deadlines.left_out(task_id, reason, stamp)
                          for task_id, reason in built.left_out.items()}
+        self._passes = self._next_latest(stamp)
         published = world.publish(built.lists, stamp)
         self._limiter.published(published, now)
         starts = chosen.timetable().starts if built.later else {}
@@ -87,8 +90,27 @@ class PlanPublisher:
         """Publish the plan in force again, for which no list has got other tasks."""
         self._allocate(self._world.lists_in_force().values(), trigger, stamp)
 
+    def _next_latest(self, stamp: float) -> float:
+        """When the next latest of a task that the plan leaves out passes; inf: none does."""
+        records = map(self._world.task_records().get, self.left_out)
+        return min((each.task.latest for each in records if each and each.task.latest >= stamp),
+                   default=math.inf)
+
+    def _note_passed(self, stamp: float) -> None:
+        """Say of tasks that are left out that their latest has passed, where that is so now."""
+        if stamp <= self._passes:
+            return
+        for task_id, why in self.left_out.items():
+            record = self._world.task_records().get(task_id)
+            if record is not None and record.task.latest < stamp:
+                self.left_out[task_id] = self._world.deadlines.left_out(task_id, why, stamp)
+        self._passes = self._next_latest(stamp)
+        self.step_tasks(stamp)
+        self._world.outbox.statuses = True
+
     def predict(self, now: float, stamp: float) -> None:
-        """Publish predicted times of the lists in force where they are news."""
+        """Publish predicted times of the lists in force, and reasons, where they are news."""
+        self._note_passed(stamp)
         if self._predictions.tick(now, stamp):
             self._allocate(self._predictions.lists(stamp).values(), 'predicted arrivals', stamp)
 

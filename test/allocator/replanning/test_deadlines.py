@@ -124,6 +124,21 @@ def test_a_deadline_that_no_uav_can_keep_is_unassigned_with_times_of_the_clock()
     assert 'its latest 1050.0 s has passed' in made.reason('t')
 
 
+def test_a_task_in_no_list_says_when_its_latest_has_passed_without_another_plan():
+    made = driver(background_budget=0.0)
+    uav(made, 'a', 0, payload_capacity=2.0, home=(500.0, 0.0, 0.0))
+    made.add(at('p', 100, payload=1.0, latest=made.now + 60.0), at('q', 100, payload=1.0,
+                                                                   latest=made.now + 500.0))
+    made.settle()
+    assert 'if it flew it first' in made.reason('p')
+    solves = list(made.solves)
+    report(made, {'a': (0, 0)}, 61.0, payload_capacity=2.0, home=(500.0, 0.0, 0.0))
+    assert made.reason('p').endswith(
+        'has passed; an update with a later `latest` would help')
+    assert 'if it flew it first' in made.reason('q')
+    assert made.solves == solves
+
+
 @pytest.mark.parametrize('objective', ['distance', 'balanced'])
 def test_an_accepted_deadline_is_not_dropped_for_a_task_of_more_value(objective):
     made = driver(objective=objective)
