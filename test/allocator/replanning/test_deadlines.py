@@ -130,13 +130,28 @@ def test_a_task_in_no_list_says_when_its_latest_has_passed_without_another_plan(
     made.add(at('p', 100, payload=1.0, latest=made.now + 60.0), at('q', 100, payload=1.0,
                                                                    latest=made.now + 500.0))
     made.settle()
-    assert 'if it flew it first' in made.reason('p')
+    assert made.reason('p').endswith('no UAV on the ground can carry it')
     solves = list(made.solves)
     report(made, {'a': (0, 0)}, 61.0, payload_capacity=2.0, home=(500.0, 0.0, 0.0))
     assert made.reason('p').endswith(
         'has passed; an update with a later `latest` would help')
-    assert 'if it flew it first' in made.reason('q')
+    assert made.reason('q').endswith('no UAV on the ground can carry it')
     assert made.solves == solves
+
+
+def test_no_uav_in_the_air_is_said_to_keep_the_deadline_of_a_payload():
+    made = driver()
+    uav(made, 'a', 0, payload_capacity=2.0, home=(500.0, 0.0, 0.0))
+    made.uav('b', 0.0, 0.0, 0.0, cruise_speed=SPEED, standby=True, payload_capacity=0.5,
+             home=(0.0, 0.0, 0.0))
+    made.add(at('p', 100, payload=1.0, latest=made.now + 60.0))
+    made.settle()
+    assert made.reason('p') == ('payload 1 kg; every UAV that could carry it is in the air; '
+                                'no UAV on the ground can carry it')
+    made.uav('b', 0.0, 0.0, 0.0, cruise_speed=SPEED, standby=True, payload_capacity=2.0,
+             home=(0.0, 0.0, 0.0), available=False)
+    made.settle()
+    assert 'b could start it at' in made.reason('p')
 
 
 @pytest.mark.parametrize('objective', ['distance', 'balanced'])

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 
 from uav_task_alloc.allocator.list_records import UavList
-from uav_task_alloc.allocator.records import TaskRecord, TaskVerdict
+from uav_task_alloc.allocator.records import TaskRecord, TaskVerdict, UavReport
 from uav_task_alloc.allocator.state.fleet import Fleet, may_fly
 from uav_task_alloc.allocator.state.flight_pace import FlightPace
 from uav_task_alloc.allocator.state.flights import Flights
@@ -141,8 +141,9 @@ class Deadlines:
         """
         best = math.inf, ''
         for uav_id, record in self._fleet.records.items():
-            if not may_fly(task, failed_on, record.report) or (
-                    usable is not None and self._fleet.usable(uav_id) != usable):
+            if not may_fly(task, failed_on, record.report) or (usable is not None and (
+                    self._fleet.usable(uav_id) != usable
+                    or not self._has_payload(task, record.report))):
                 continue
             pace = self._flights.pace(uav_id)
             if at_best:
@@ -152,6 +153,11 @@ class Deadlines:
             seconds = min(pace.seconds((record.report.position, place)) for place in places)
             best = min(best, (max(max(begin, task.release) + seconds, task.earliest), uav_id))
         return best
+
+    def _has_payload(self, task: Task, report: UavReport) -> bool:
+        """Whether a UAV has the payload of an accepted task on board, or could take it on."""
+        return task.payload == 0.0 or self._tasks.records[task.id].uav == report.uav_id or (
+            report.standby and task.payload <= (report.payload_capacity or 0.0))
 
     def _text(self, record: TaskRecord, start: float, stamp: float) -> str:
         """Why a listed task is late, by how much, and what would help."""
@@ -170,7 +176,8 @@ class Deadlines:
             return (f'{other_id} could start it at {clock_text(other, stamp)} if it were '
                     'available')
         if math.isinf(min(first, other)):
-            return 'no UAV that may fly it is known'
+            return ('no UAV on the ground can carry it' if task.payload > 0.0 else
+                    'no UAV that may fly it is known')
         start, uav_id = min((first, uav_id), (other, other_id))
         return (f'no UAV can start it before {clock_text(start, stamp)} ({uav_id}); an update '
                 'with a later `latest` would help')
