@@ -165,6 +165,31 @@ def test_an_order_goes_out_at_once(driver):
     assert 't1' not in driver.route('a')
 
 
+@pytest.mark.parametrize(('action', 'uav_id', 'routes'), [
+    ('PIN', 'b', (('t2',), ('t3', 't1'))), ('FORBID', 'a', (('t2',), ('t3', 't1'))),
+    ('ORDER', 'b', (('t2',), ('t1', 't3')))])
+@pytest.mark.parametrize('approval', ['replan', 'all'])
+def test_a_task_that_an_order_moves_waits_for_no_approval(approval, action, uav_id, routes):
+    driver = AllocatorDriver(approval=approval, uav_timeout=5.0)  # no other task moves
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.uav('b', 1000.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 900, 0))
+    driver.settle()
+    if approval == 'all':
+        decide(driver, accept=True)
+    assert driver.order(action, uav_id, 't1').success
+    driver.settle()
+    assert (driver.route('a'), driver.route('b')) == routes
+    assert driver.world.proposal is None
+    driver.add(('t4', 950, 0))
+    driver.settle()
+    assert driver.reason('t4').startswith('waits for the approval of plan')
+    assert driver.order('PIN', 'b', 't4').success  # it has no UAV yet
+    driver.settle()
+    assert 't4' in driver.route('b')
+    assert driver.world.proposal is None
+
+
 def test_an_open_proposal_outlives_a_restart_and_is_applied_once(driver):
     driver.add(('t4', 300, 0))
     driver.settle()

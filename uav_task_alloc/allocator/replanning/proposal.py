@@ -36,7 +36,7 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
     """Divide a plan by what needs the approval of an operator.
 
     Never held up are lists that cannot be flown on as they are (a zone, a lost UAV, a battery, an
-    order), with those that exchange tasks with them. With `approval: replan` the first tasks of
+    order), those of UAVs that get tasks by an order, and those that exchange tasks with them. With `approval: replan` the first tasks of
     UAVs without any need none either.
 
     Args:
@@ -54,8 +54,9 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
     before = present_routes(world, world.lists_in_force())
     after = {uav_id: each.task_ids for uav_id, each in built.lists.items()}
     held, reasons = set[str](), dict[str, str]()
-    for group in exchange_groups(before, after):
-        why = next(filter(None, map(world.why_change, sorted(group))), '')
+    for group in exchange_groups(_open_routes(world, after), after):
+        why = next(filter(None, (_why_at_once(world, uav_id, before, after)
+                                 for uav_id in sorted(group))), '')
         first = not any(before.get(uav_id) for uav_id in group)
         if all(world.lists.is_void(built.lists[uav_id]) for uav_id in group):
             continue
@@ -73,6 +74,19 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
     waiting = set(_tasks_of(proposal)) - {
         task_id for task_ids in before.values() for task_id in task_ids}
     return SplitPlan(now, text, proposal, frozenset(waiting))
+
+
+def _open_routes(world: World, uav_ids: Iterable[str]) -> TaskIdsByUav:
+    """The open tasks of lists in force, also those that their UAVs may not fly any more."""
+    return {uav_id: tuple(filter(world.tasks.is_open, world.list_of(uav_id).task_ids))
+            for uav_id in uav_ids}
+
+
+def _why_at_once(world: World, uav_id: str, before: TaskIdsByUav, after: TaskIdsByUav) -> str:
+    """Why a UAV may not wait for another list; '' if it may."""
+    gained = {*after[uav_id]}.difference(before.get(uav_id, ()))
+    ordered = any(world.orders.owner(task_id) == uav_id for task_id in gained)
+    return world.why_change(uav_id) or ('an order' if ordered else '')
 
 
 def _tasks_of(proposal: Proposal) -> Iterator[str]:
