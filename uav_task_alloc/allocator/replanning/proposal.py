@@ -36,8 +36,8 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
     """Divide a plan by what needs the approval of an operator.
 
     Never held up are lists that cannot be flown on as they are (a zone, a lost UAV, a battery, an
-    order), those of UAVs that get tasks by an order, and those that exchange tasks with them. With `approval: replan` the first tasks of
-    UAVs without any need none either.
+    order), those of UAVs that get tasks by an order, and those that exchange tasks with them.
+    With `approval: replan` the first tasks of UAVs without any need none either.
 
     Args:
         world: as it is now.
