@@ -80,6 +80,8 @@ def test_a_task_that_cannot_be_reached_apart_gets_another_uav():
     result = plan(uavs, tasks, budget=0.05, separation=RULE, altitude_max=30.0)
     assert conflicts_of(result, uavs, tasks) == []
     assert {each.resolution for each in result.conflicts} & {'other uav', 'left out'}
+    assert not result.warm_started  # another solve continues the first one
+    assert result.history[0][0] <= result.solve_time
     assert all(each.position for each in result.conflicts)
     for name, why in result.unassigned.items():
         assert 'cannot be kept apart from' in why, name

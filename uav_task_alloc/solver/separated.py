@@ -77,8 +77,16 @@ def separated_plan(solve: Solve, uavs: Sequence[Uav], tasks: Sequence[Task],
             moved[name] = conflict
             if turn == _ROUNDS - 1:
                 known[name] = replace(known[name], allowed_uavs=frozenset())
-        result = solve(list(known.values()), result, _AGAIN_SHARE * budget)
+        result = _after(result, solve(list(known.values()), result, _AGAIN_SHARE * budget))
     return _with_resolution(result, trips, rules, flights, found, moved)
+
+
+def _after(first: Plan, again: Plan) -> Plan:
+    """A plan of another solve with the time, the iterations and the start of all of them."""
+    return replace(again, solve_time=first.solve_time + again.solve_time,
+                   iterations=first.iterations + again.iterations,
+                   warm_started=first.warm_started, history=tuple(
+                       (first.solve_time + seconds, fit) for seconds, fit in again.history))
 
 
 def _barred(found: Resolution, fixed: Iterable[str], rule: Separation
