@@ -223,6 +223,19 @@ def test_a_payload_that_waits_for_a_uav_on_the_ground_is_planned_when_one_lands(
     assert driver.begin() is None
 
 
+def test_a_later_trip_begins_when_its_uav_has_landed_with_a_good_battery():
+    driver = AllocatorDriver(plan=plan, route_end='home', trips=2)
+    able = {'home': (0.0, 0.0, 0.0), 'payload_capacity': 2.0, 'full_range': 20000.0,
+            'turnaround': 30.0, 'range': 19000.0, 'battery': 0.95}
+    driver.uav('a', 100.0, 0.0, 50.0, **able)
+    driver.add(Task('p', (100.0, 0.0, 30.0), payload=1.0))
+    driver.settle()
+    assert (driver.state('p'), driver.reason('p')) == ('ASSIGNED', 'after battery change 1 of a')
+    driver.uav('a', 0.0, 0.0, 0.0, standby=True, **able)
+    driver.settle()
+    assert driver.route('a') == ('p',)
+
+
 def test_a_task_out_of_range_is_planned_when_a_uav_has_another_battery():
     driver = AllocatorDriver(plan=plan, route_end='home')
     home = {'home': (0.0, 0.0, 0.0), 'standby': True, 'full_range': 3000.0}

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from uav_task_alloc.allocator.records import TaskRecord, TaskState, UavReport
+from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.allocator.state.orders import Orders
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.model import Point, Task, Uav
@@ -289,8 +289,8 @@ def may_fly(task: Task, failed_on: Iterable[str], uav: UavReport) -> bool:
 
 
 def replan_reasons(before: UavRecord | None, after: UavRecord,
-                   open_tasks: Callable[[], Iterable[TaskRecord]]) -> list[str]:
-    """Return what in a new report requires a plan; `open_tasks` returns those still to be done."""
+                   unlisted: Callable[[], bool]) -> list[str]:
+    """Return what in a new report requires a plan; `unlisted`: whether a task is in no list."""
     report, reasons = after.report, []
     if before is None or before.silent:
         reasons += ['reports again' if before else 'reports'] if report.available else []
@@ -306,8 +306,7 @@ def replan_reasons(before: UavRecord | None, after: UavRecord,
     if before is None or reasons:
         return reasons
     can_more = _can_more(before, after)
-    waiting = can_more and any(each.state is TaskState.UNASSIGNED for each in open_tasks())
-    return [can_more] if waiting else []
+    return [can_more] if can_more and unlisted() else []
 
 
 def _can_more(before: UavRecord, after: UavRecord) -> str:

@@ -149,7 +149,8 @@ class World:
         before = self.fleet.update(report, now, self.params.battery_reserve)
         self.flights.update(report, stamp)
         self._missed.observe(report, stamp)
-        for reason in replan_reasons(before, self.fleet.records[uav_id], self.tasks.open):
+        for reason in replan_reasons(before, self.fleet.records[uav_id], lambda: bool(
+                {each.task.id for each in self.tasks.open()} - self.lists.owners().keys())):
             self.note(f'{uav_id} {reason}')
             self.request_replan(f'{uav_id} {reason}', now)
         self._check_jump(before, report, now)
