@@ -317,6 +317,29 @@ def test_a_list_of_an_earlier_version_has_no_services():
     assert 'times' not in parts
 
 
+def test_an_ended_task_that_the_allocator_has_forgotten_stays_as_it_ended():
+    done = statuses(BEGIN + 10, t1='COMPLETED u1', t2='CANCELLED', t3='ACTIVE u2')
+    forgotten = statuses(BEGIN + 20, t3='ACTIVE u2')
+    parts, events, _ = updates(FIRST, [done], [forgotten])
+    assert parts['statuses'] == {'t1': ['COMPLETED', 'u1', ''], 't2': ['CANCELLED', '', ''],
+                                 't3': ['ACTIVE', 'u2', '']}
+    assert events == []
+
+
+def test_a_forgotten_task_that_is_announced_again_is_a_new_one():
+    rounds = [[announced(BEGIN + wall, ['t1']), statuses(BEGIN + wall, t1='ACTIVE u1'),
+               statuses(BEGIN + wall + 9.0, t1='COMPLETED u1'), statuses(BEGIN + wall + 10.0)]
+              for wall in (0.0, 100.0)]
+    scene = Scene(RunState())
+    for line in sum(rounds, []):
+        scene.apply(line)
+    assert scene.run.flown['t1'].end == BEGIN + 109.0
+    assert scene.run.tasks['t1'].wall == BEGIN + 100.0
+    assert scene.run.start() == BEGIN  # the clock of the mission goes on
+    scene.apply(announced(BEGIN + 200.0, ['t1']))
+    assert scene.part('statuses') == {}
+
+
 FIELD = {'id': 'field', 'position': [0.0, 0.0, 40.0], 'value': 1.0, 'service': 0.0,
          'work': 'AREA', 'holes': [], 'radius': None,
          'path': [[0.0, 0.0, 40.0], [200.0, 0.0, 40.0], [200.0, 40.0, 40.0], [0.0, 40.0, 40.0]]}

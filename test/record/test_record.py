@@ -242,6 +242,13 @@ def test_a_run_is_not_over_while_a_uav_moves_or_a_task_is_open(more):
     assert not run_is_over(run_state(*DONE, more), TWO, clock=9.0)
 
 
+def test_tasks_that_the_allocator_has_forgotten_count_as_they_ended():
+    ended, rest = status(('a', 'COMPLETED'), ('b', 'FAILED')), status(('b', 'FAILED'))
+    run = run_state(*DONE, ended, rest)
+    assert headline(run, 9.0).startswith('    9 s  1 of 2 tasks completed, 1 failed;')
+    assert run_is_over(run, TWO, clock=9.0)
+
+
 def test_a_run_is_not_over_before_the_last_event_of_its_scenario():
     assert not run_is_over(run_state(*DONE), TWO, clock=7.0)
     assert not run_is_over(run_state(announced('ADD', 'a'), *DONE[1:]), TWO, clock=9.0)

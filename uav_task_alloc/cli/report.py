@@ -53,7 +53,7 @@ def summarise(out_dir: str | Path) -> Summary:
 def run_summary(state: RunState, truth: GroundTruth) -> Summary:
     """The key figures of a run; a task counts as completed only if a vehicle was there."""
     reached, passes = served(state, truth), piece_passes(state, truth)
-    known = {**state.ended, **state.statuses}
+    known = state.known_statuses()
     fates = {name: fate(name, state, bool(reached[name])) for name in state.tasks}
     names = {kind: sorted(name for name, its_fate in fates.items() if its_fate == kind)
              for kind in ('completed', 'unassigned', 'cancelled', 'lost')}
@@ -130,7 +130,7 @@ def why_lost(name: str, state: RunState) -> str:
 
 def planned_length(state: RunState, completed: Sequence[str]) -> float:
     """Length [m] of the legs to completed tasks and home, as planned when each became next."""
-    known = {**state.ended, **state.statuses}
+    known = state.known_statuses()
     rows = {**{name: known[name] for name in completed}, **{
         piece: row for piece, row in state.pieces.items() if row.state == 'COMPLETED'}}
     legs = [state.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
@@ -221,7 +221,7 @@ def warn_of_ends(out: Path, run: RunState, truth: GroundTruth) -> None:
     for name in (RECORD_FILE, TRUTH_FILE):
         for text in filter(None, [unfinished(out / name)]):
             log_line(f'Warning: {name} {text}')
-    known = {**run.ended, **run.statuses}
+    known = run.known_statuses()
     still = sum(name not in known or known[name].state not in FINAL_STATES for name in run.tasks)
     if still:
         log_line(f'Warning: {RECORD_FILE} ends while {still} of {len(run.tasks)} tasks are open')

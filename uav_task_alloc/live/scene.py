@@ -147,7 +147,7 @@ class Scene:
             return {task: to_decimetres(row.position) for task, row in run.tasks.items()}
         if name == 'statuses':  # [state, UAV, reason] by id
             return {task: [row.state, row.uav, row.reason]
-                    for task, row in run.statuses.items()}
+                    for task, row in run.known_statuses().items()}
         if name == 'times':
             return self.times()
         if name == 'works':
@@ -227,7 +227,7 @@ class Scene:
         for name, task in run.tasks.items():
             if not task.work:
                 continue
-            status = run.statuses.get(name)
+            status = run.status(name)
             found[name] = {
                 'kind': task.work, 'path': [to_decimetres(point) for point in task.path],
                 'holes': [[to_decimetres(point) for point in hole] for hole in task.holes],

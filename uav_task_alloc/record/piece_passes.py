@@ -33,7 +33,7 @@ def served(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]]:
     """
     points = {name: state.places.get(name, task.position)
               for name, task in state.tasks.items() if not task.work}
-    owners = {name: status.uav for name, status in {**state.ended, **state.statuses}.items()
+    owners = {name: status.uav for name, status in state.known_statuses().items()
               if status.state == 'COMPLETED'}
     found = visits(truth, points, state.waited, owners)
     passes = piece_passes(state, truth)

@@ -90,7 +90,7 @@ def run_is_over(run: RunState, scenario: Scenario, clock: float) -> bool:
     dead = {uav.id for uav in scenario.uavs if uav.dies_at is not None}
     return (clock > scenario.duration
             and run.tasks.keys() >= {timed.task.id for timed in scenario.tasks}
-            and all(name in run.statuses and run.statuses[name].state in FINAL_STATES
+            and all((status := run.status(name)) and status.state in FINAL_STATES
                     for name in run.tasks)
             and all(uav.id in dead or _at_rest(run.uavs.get(uav.id))
                     for uav in scenario.uavs))

@@ -82,6 +82,7 @@ class RunState:
     fence_area: AreaCorners = ()  # [m]; (): none
     measured: bool = True  # `rate` is that of the vehicles' clocks, as no one stated it
     clock_rates: dict[str, float] = field(default_factory=dict)  # of the vehicles, by UAV
+    begun: float = math.inf  # [unix s] of the first announced task
     first: float = math.inf  # [unix s] of the first line
     last: float = -math.inf  # [unix s] of the last line
 
@@ -127,12 +128,15 @@ class RunState:
                     continue
                 if line['action'] == 'ADD':
                     self.cancelled.discard(task['id'])
+                    if self.ended.pop(task['id'], None):  # forgotten, and now a new task
+                        known = None
                 self.tasks[task['id']] = AnnouncedTask(
                     tuple(task['position']), known.wall if known else self._announced_at(line),
                     task.get('service', 0.0), task.get('earliest'), task.get('latest'),
                     task.get('work', ''), tuple(map(tuple, task.get('path', ()))),
                     tuple(tuple(map(tuple, hole)) for hole in task.get('holes', ())),
                     task.get('radius') or 0.0)
+                self.begun = min(self.begun, self.tasks[task['id']].wall)
 
     def _announced_at(self, line: Line) -> float:
         """When tasks were announced [unix s]: by the stamp, where that is before the record."""
@@ -169,6 +173,10 @@ class RunState:
         """
         return self.statuses.get(task) or self.ended.get(task)
 
+    def known_statuses(self) -> dict[str, ReportedStatus]:
+        """The last status of each task, also of those that the allocator has forgotten."""
+        return {**self.ended, **self.statuses}
+
     def _is_refused(self, task_id: str, action: str) -> bool:
         """Whether the allocator refuses an ADD or UPDATE of a task that it has, or had."""
         status = self.statuses.get(task_id)
@@ -179,8 +187,9 @@ class RunState:
     def on_statuses(self, line: Line) -> None:
         """The statuses of all tasks."""
         for row in line['statuses']:
-            if (row['state'] == 'COMPLETED' and row['task'] not in self.flown
-                    and not self.ended_before(row, line)):
+            if row['state'] != 'COMPLETED':
+                self.flown.pop(row['task'], None)  # forgotten, and announced again
+            elif row['task'] not in self.flown and not self.ended_before(row, line):
                 task = self.tasks.get(row['task'])
                 service = task.service / self.speedup if task else 0.0
                 self.flown[row['task']] = Service(row['uav'], line['wall'] - service, line['wall'])
@@ -188,7 +197,9 @@ class RunState:
                                             row.get('done', 0), row.get('pieces', 0))
                 for row in line['statuses']}
         self.ended.update((task, row) for task, row in self.statuses.items()
-                          if task not in rows and row.state in END_STATES)
+                          if row.state in END_STATES)
+        for task in rows.keys() & self.ended.keys():
+            del self.ended[task]
         self.pieces = {task: row for task, row in rows.items() if split_piece(task)[1]}
         self.statuses = {task: row for task, row in rows.items() if task not in self.pieces}
 
@@ -345,16 +356,16 @@ class RunState:
 
     def count(self, *states: str) -> int:
         """Number of tasks in one of these states."""
-        return sum(status.state in states for status in self.statuses.values())
+        return sum(status.state in states for status in self.known_statuses().values())
 
     def completed(self) -> set[str]:
         """Ids of the completed tasks and pieces."""
-        return {task for task, status in {**self.statuses, **self.pieces}.items()
+        return {task for task, status in {**self.known_statuses(), **self.pieces}.items()
                 if status.state == 'COMPLETED'}
 
     def start(self) -> float:
         """Time of the first announced task [unix s]; of the first line where there is none."""
-        return min((task.wall for task in self.tasks.values()), default=self.first)
+        return self.begun if self.tasks else self.first
 
     def clock(self, wall: float) -> float:
         """Scenario time [s] at a wall time."""
