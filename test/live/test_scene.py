@@ -331,7 +331,7 @@ def test_a_forgotten_task_that_is_announced_again_is_a_new_one():
                statuses(BEGIN + wall + 9.0, t1='COMPLETED u1'), statuses(BEGIN + wall + 10.0)]
               for wall in (0.0, 100.0)]
     scene = Scene(RunState())
-    for line in sum(rounds, []):
+    for line in [*rounds[0], *rounds[1]]:
         scene.apply(line)
     assert scene.run.flown['t1'].end == BEGIN + 109.0
     assert scene.run.tasks['t1'].wall == BEGIN + 100.0

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.record.events import sentences
 from uav_task_alloc.record.message_records import zones_record
 from uav_task_alloc.record.run_state import RunState
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
@@ -50,10 +51,13 @@ def zone_message(zone_id, margin):
 
 
 def test_a_zone_that_is_invalid_in_a_message_stays_as_it_was():
-    run = RunState()
+    run, events = RunState(), []
     for wall, zones in ((1.0, [zone_message('z1', 0.0), zone_message('z2', 0.0)]),
                         (2.0, [zone_message('z1', -1.0)])):
-        run.apply({'wall': wall, **zones_record(SimpleNamespace(zones=zones))})
+        line = {'wall': wall, **zones_record(SimpleNamespace(zones=zones))}
+        events += [text for _, text in sentences(run, line)]
+        run.apply(line)
+    assert events == ['new zone z1, z2', 'zone z2 removed']
     assert [zone.id for zone in run.zones_now()] == ['z1']
     moved = ThreatZone.cylinder('z1', (70.0, 0.0), 20.0)
     run.apply({'kind': 'zones', 'wall': 3.0, 'zones': [encode_zone(moved, JSON_ZONE)],

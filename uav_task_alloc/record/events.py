@@ -68,7 +68,7 @@ def proposal_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
 def zone_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
     """Zones that are new or removed."""
     old = {zone.id for zone in state.zones_now()}
-    new = {row['id'] for row in line['zones']}
+    new = {row['id'] for row in line['zones']} | old.intersection(line.get('kept', ()))
     for names, text in ((new - old, 'new zone {}'), (old - new, 'zone {} removed')):
         if names:
             yield 'zone', text.format(_ids(sorted(names)))
