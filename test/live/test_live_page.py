@@ -185,6 +185,17 @@ def test_a_page_says_that_it_is_stale_and_reconnects_automatically(view, run, se
     wait(page, '#counts', '0 of 3 tasks done')
 
 
+def test_a_page_of_a_node_that_hangs_says_so_though_its_server_lives(view, run):
+    page = view(run.snapshots)
+    run.clock['beat'] = 1
+    run.add(*uavs(BEGIN + 21))  # the stream goes on with this
+    wait(page, '#banner', 'No data from live_view for 0:0')
+    assert text(page, '#state') == '✕ no data'
+    run.clock['beat'] = 2
+    run.add(*uavs(BEGIN + 22))
+    page.wait_for_selector('#banner', state='hidden')
+
+
 def cut(server):
     """End all streams of a server as a broken connection does, without the last event."""
     def broken(_):

@@ -113,6 +113,8 @@ def test_the_page_shows_what_the_node_receives(start, probe):
     assert [zone['id'] for zone in got['zones']] == ['z1']
     assert list(got['uavs']) == ['uav_1']
     assert [task['id'] for task in got['list uav_1']['tasks']] == ['t1']
+    beat = page_of(view, 'at?wall=9e9')['clock']['beat']
+    probe.until(lambda: page_of(view, 'at?wall=9e9')['clock']['beat'] != beat)
     assert view.stop()[0] == 0
 
 

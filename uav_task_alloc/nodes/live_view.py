@@ -280,6 +280,7 @@ class LiveView(Node):
         updates = self.scene.updates(wall, ended)
         if self.server:
             self.snapshots.put(wall, {'start': self.state.start(), 'live': True,
+                                      'beat': self.snapshots.version,  # another each time
                                       'speedup': self.state.speedup, 'rate': self.state.rate,
                                       'ended': ended, 'still': self.watch.still}, *updates)
 

@@ -102,7 +102,8 @@ function draw() {
 }
 
 function apply(update) {
-  receivedAt = performance.now();
+  const {beat} = update.clock;  // of a node that lives; a server may outlive it
+  if (beat === undefined || beat !== live.clock.beat) receivedAt = performance.now();
   live.closed = false;
   if (update.all) Object.assign(live, {parts: {}, events: [], plans: []});
   live.clock = update.clock;
