@@ -12,6 +12,7 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 from nav_msgs.msg import Path as PathMsg
+from rclpy.clock import ClockType
 from rosgraph_msgs.msg import Clock
 from uav_task_alloc_msgs import msg as m
 
@@ -197,6 +198,12 @@ def test_a_disk_that_fails_ends_the_recording_and_nothing_else(probe, tmp_path, 
     assert recorder.thread.is_alive()
     recorder.stop()
     assert [line['kind'] for line in BagReader(tmp_path / 'run.mcap')] == ['run']
+
+
+def test_a_clock_of_the_computer_that_goes_back_delays_no_flush(probe, tmp_path):
+    recorder = BagRecorder(tmp_path / 'run.mcap', context=probe.context)
+    assert [timer.clock.clock_type for timer in recorder.node.timers] == [ClockType.STEADY_TIME]
+    recorder.stop()
 
 
 def test_a_definition_holds_all_a_message_is_made_of():

@@ -19,6 +19,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from uav_task_alloc.nodes.conversions.message_definitions import definition
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
+from uav_task_alloc.nodes.ros.clock_watch import steady_clock
 from uav_task_alloc.record.bag import Bag
 
 _DISCOVERY_PERIOD = 1.0  # [s] between two checks for new topics; also the shortest flush period
@@ -71,7 +72,7 @@ class BagRecorder:
         self.known: set[str] = set()  # topics that are recorded, or cannot be
         for name, (type_name, qos) in _FLEET_TOPICS.items():
             self.record(self.prefix + name, type_name, qos)
-        self.node.create_timer(_DISCOVERY_PERIOD, self.on_timer)
+        self.node.create_timer(_DISCOVERY_PERIOD, self.on_timer, clock=steady_clock())
         self.started_at = self.flushed_at = time.monotonic()
         self.stopping = Event()
         self.thread = Thread(target=self.run, name='recorder', daemon=True)
