@@ -11,6 +11,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.cli import report
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.flight_report.flight_history import read_history
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_definitions import definition
 from uav_task_alloc.nodes.conversions.messages import announcement, from_zones, header
@@ -149,6 +150,17 @@ def test_the_report_prints_its_path_and_its_figures(whole, tmp_path, capsys):
     text = html.read_text()
     for words in ('<td>t1</td><td>unassigned</td>', 'inside zone a', '"u1 flown"'):
         assert words in text
+
+
+def test_a_plan_that_waited_for_an_operator_is_an_event_of_the_report(tmp_path):
+    asked = m.PlanProposal(plan=m.Allocation(revision=7, lists=[m.TaskList(uav_id='u1')]),
+                           changes=['u1 gains t1'])
+    answered = m.PlanProposal(plan=m.Allocation(revision=7), changes=['plan 7: rejected by ann'])
+    path = write(tmp_path / 'asked.mcap', [*MESSAGES, ('/plan_proposal', asked),
+                                           ('/plan_proposal', answered)])
+    assert [text for _, kind, text in read_history(BagReader(path, '/')).events
+            if kind == 'plan'] == ['plan 7 waits for approval: u1 gains t1',
+                                   'plan 7: rejected by ann']
 
 
 def test_of_a_bag_cut_short_anywhere_all_whole_chunks_are_read(whole, tmp_path):

@@ -35,6 +35,7 @@ _BUILDERS: dict[str, Callable[[Any], message_records.RecordBody]] = {
     _LIST: message_records.task_list_record,
     _PACKAGE + 'UavState': message_records.state_record,
     _PACKAGE + 'SeparationAlert': message_records.separation_record,
+    _PACKAGE + 'PlanProposal': message_records.proposal_record,
     _ORIGIN: message_records.origin_record,
     _AREA: message_records.fence_area_record,
     _DIAGNOSTICS: diagnostic_records.uploads_record}
