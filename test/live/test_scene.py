@@ -238,6 +238,12 @@ def test_the_terminal_shows_authority():
     assert fleet_lines(run, BEGIN)[0].endswith('authority none: words')
 
 
+def test_an_alert_whose_difference_in_height_is_unknown_is_an_event():
+    alert = {'kind': 'separation', 'wall': BEGIN + 1.0, 'uavs': ['u1', 'u2'], 'horizontal': 4.0,
+             'vertical': None, 'until': 3.0, 'action': 'HOLD', 'holder': 'u1', 'reason': 'u1 holds'}
+    assert event_texts(FIRST, [alert]) == ['u1 and u2 would be 4 m apart, in 3 s: u1 holds']
+
+
 def test_silence_and_its_end_are_one_event_each():
     assert event_texts(FIRST, [statuses(BEGIN + 3)]) == ['u1 is silent', 'u2 is silent']
     assert event_texts(FIRST, [statuses(BEGIN + 3)], [statuses(BEGIN + 4)]) == []

@@ -83,8 +83,9 @@ def separation_sentences(_: RunState, line: Line) -> Iterator[Sentence]:
         yield kind, f'{names}: {goes_on}{line["reason"]}'
         return
     when = f'in {line["until"]:.0f} s' if line['until'] > 0.0 else 'now'
-    yield kind, (f'{names} would be {line["horizontal"]:.0f} m apart, {line["vertical"]:.0f} m '
-                 f'in height, {when}: {line["reason"]}')
+    height = '' if line['vertical'] is None else f', {line["vertical"]:.0f} m in height'
+    yield kind, (f'{names} would be {line["horizontal"]:.0f} m apart{height}, {when}: '
+                 f'{line["reason"]}')
 
 
 def state_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
