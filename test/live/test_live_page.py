@@ -343,6 +343,22 @@ def test_the_head_counts_pieces_and_one_of_each_as_one(view):
         '0 of 1 task done, 2 pieces to fly; 1 UAV; 1 zone; 0 re-plans')
 
 
+def test_pieces_that_no_uav_has_are_not_flown_by_another(view):
+    line = {'id': 'line', 'position': [0.0, 0.0, 40.0], 'work': 'LINE', 'holes': [],
+            'path': [[0.0, 0.0, 40.0], [200.0, 0.0, 40.0]]}
+    whole = {'task': 'line', 'state': 'ASSIGNED', 'uav': 'u1', 'reason': '', 'done': 1,
+             'pieces': 6}
+    run = Run().add({'kind': 'announcement', 'wall': BEGIN, 'action': 'ADD', 'tasks': [line]},
+                    listed(BEGIN, 'u1', 1, ['line#2', 'line#3']),
+                    {'kind': 'statuses', 'wall': BEGIN, 'statuses': [whole]})
+    page = view(run.snapshots)
+    page.fill('#find', 'line')
+    wait(page, '#answer',
+         '1 of 6 pieces of line are flown; u1 flies 2 more; no UAV has the other 3.')
+    run.add(listed(BEGIN + 1, 'u1', 2, [f'line#{k}' for k in range(2, 7)]))
+    wait(page, '#answer', '1 of 6 pieces of line are flown; u1 flies the rest.')
+
+
 def test_the_hint_of_the_search_fits(view):
     page = view(Run().add(*FIRST).snapshots)
     page.set_viewport_size({'width': 1440, 'height': 900})

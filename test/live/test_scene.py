@@ -240,7 +240,8 @@ def test_the_terminal_shows_authority():
 
 def test_an_alert_whose_difference_in_height_is_unknown_is_an_event():
     alert = {'kind': 'separation', 'wall': BEGIN + 1.0, 'uavs': ['u1', 'u2'], 'horizontal': 4.0,
-             'vertical': None, 'until': 3.0, 'action': 'HOLD', 'holder': 'u1', 'reason': 'u1 holds'}
+             'vertical': None, 'until': 3.0, 'action': 'HOLD', 'holder': 'u1',
+             'reason': 'u1 holds'}
     assert event_texts(FIRST, [alert]) == ['u1 and u2 would be 4 m apart, in 3 s: u1 holds']
 
 

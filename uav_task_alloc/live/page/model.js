@@ -156,10 +156,13 @@ export function answer(id, model) {
 // Of work that is flown in pieces: how much is done, and who flies the rest.
 function workText(id, {done, pieces}, model) {
   const flown = `${done} of ${pieces} pieces of ${id} are flown`;
-  const uavs = [...model.lists].filter(([, list]) =>
-    list.some(task => task.id.startsWith(`${id}#`))).map(([uav]) => uav);
+  const listed = [...model.lists].map(([uav, list]) =>
+    [uav, list.filter(task => task.id.startsWith(`${id}#`)).length]).filter(([, count]) => count);
+  const uavs = listed.map(([uav]) => uav), count = listed.reduce((sum, row) => sum + row[1], 0);
   const names = uavs.length === 2 ? uavs.join(' and ') : some(uavs, 8);
-  return uavs.length ? `${flown}; ${names} ${uavs.length > 1 ? 'fly' : 'flies'} the rest.`
+  const open = pieces - done - count;
+  const rest = open > 0 ? `${count} more; no UAV has the other ${open}` : 'the rest';
+  return uavs.length ? `${flown}; ${names} ${uavs.length > 1 ? 'fly' : 'flies'} ${rest}.`
     : `${flown}.`;
 }
 
