@@ -155,7 +155,8 @@ class BridgeParams(FrameParams):
     fences: str = param('off', 'Zones as fences on board; require: no take-off without them.',
                         choices=('off', 'warn', 'require'))
     fence_area: tuple[str, ...] = param(
-        (), 'Corners `LATITUDE,LONGITUDE` of a fence that all stay in; empty: none.', fixed=True)
+        (), 'Corners `LATITUDE,LONGITUDE` of the area that all stay in, with `fences` also by a '
+        'fence on board; empty: none.', fixed=True)
     rally_points: tuple[str, ...] = param(
         (), 'Places to return to, `LATITUDE,LONGITUDE[,HEIGHT above home]`.', fixed=True)
     relaunch: str = param('operator', 'Who starts a UAV after its list or a low battery: '

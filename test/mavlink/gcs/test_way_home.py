@@ -7,6 +7,7 @@ from findings_bench import BOTH, MODES, FindingsBench
 from mission_bench import task_list
 
 from uav_task_alloc.geometry.zones import inside
+from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task, ThreatZone
@@ -152,3 +153,39 @@ def test_a_vehicle_that_flies_around_its_fence_returns_by_itself():
     bench.run(limit=5.0)
     assert bench.executor().onboard.remaining().returns
     assert bench.executor().onboard.remaining().end_via == ()
+
+
+def area(*corners):
+    """A `fence_area` of the bridge; corners [m], counter-clockwise."""
+    return FenceShape('', corners=corners, inclusion=True)
+
+
+# the return from OUT crosses the notch, the detour by `around()` does not
+NOTCHED = area((-50.0, -90.0), (130.0, -90.0), (130.0, 90.0), (170.0, 90.0), (170.0, -90.0),
+               (400.0, -90.0), (400.0, 200.0), (-50.0, 200.0))
+
+
+@BOTH
+@pytest.mark.parametrize('fences', ['off', 'warn'])
+def test_no_way_of_the_bridge_leaves_the_fence_area(kind, fences):
+    bench = made(kind, fence_area=NOTCHED, fences=fences)
+    bench.assign(listed())
+    outside = bench.executor().policy.no_fly_zones
+    positions = []
+    bench.run(lambda: positions.append(bench.vehicles[1].flight.body.position), 200.0)
+    assert bench.completed() == ['t']
+    assert [p for p in positions if any(inside(p, zone) for zone in outside)] == []
+    assert place(bench) == OUT
+    row = diagnostics_of(bench.ground_station.sessions[1], bench.now)
+    assert 'zone outside of fence_area' in row.summary
+
+
+@BOTH
+def test_a_vehicle_whose_home_is_outside_of_the_fence_area_does_not_take_off(kind):
+    bench = made(kind, fence_area=area((50.0, -90.0), (400.0, -90.0), (400.0, 200.0),
+                                       (50.0, 200.0)))
+    bench.assign(listed())
+    bench.run(limit=60.0)
+    assert not bench.vehicles[1].flight.armed
+    assert bench.executor().sender.waits_for == (
+        'another fence_area: the home is outside of it')

@@ -69,7 +69,7 @@ class EndOfList:
         return self._sender.set_mode(ModeFunction.RETURN, now)
 
     def _list_and_zones(self) -> tuple[TaskList | None, tuple[ThreatZone, ...]]:
-        return self._onboard.tasks, self._policy().zones
+        return self._onboard.tasks, self._policy().no_fly_zones
 
     def given_up(self, now: float) -> NextMessages:
         """Do not fly a list again from which a zone made it return, while both are the same."""
@@ -155,7 +155,7 @@ class EndOfList:
 
     def _blocked_home(self) -> str:
         """Why it must not fly straight home; '': it may."""
-        telemetry, zones = self._telemetry, self._policy().zones
+        telemetry, zones = self._telemetry, self._policy().no_fly_zones
         if telemetry.home is None or not telemetry.has_position:
             return 'its path home is not known' if zones else ''
         zone = self._onboard.list.way_home.zone_on_return(telemetry.position, telemetry.home)

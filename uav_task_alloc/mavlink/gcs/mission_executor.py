@@ -74,7 +74,7 @@ class MissionExecutor:
         self.onboard = OnboardMission(peer, profile, origin, self.telemetry, rng)
         self.sender = CommandSender(peer, profile, self.telemetry)
         self.onboard.list.leg.locate = self._leg_start
-        self.onboard.list.zones = lambda: self.policy.zones
+        self.onboard.list.zones = lambda: self.policy.no_fly_zones
         evidence = MissionEvidence(self.onboard, self.telemetry, profile.atomic)
         self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
+from uav_task_alloc.geometry.fence_area import zones_outside
 from uav_task_alloc.mavlink.fence.rally import RallyPoint
 from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.model import ThreatZone
@@ -25,3 +27,13 @@ class Policy:
     zones_known: bool = False  # `zones` were received; else they are empty until then
     fence_area: FenceShape | None = None  # that all vehicles stay in
     rally: tuple[RallyPoint, ...] = ()  # places to return to; the store is left alone without
+
+    @property
+    def no_fly_zones(self) -> tuple[ThreatZone, ...]:
+        """The zones, and what is outside of `fence_area`: no way of the bridge enters them."""
+        return (*self.zones, *_outside(self.fence_area))
+
+
+@lru_cache(maxsize=8)
+def _outside(area: FenceShape | None) -> tuple[ThreatZone, ...]:
+    return zones_outside(area.corners if area else ())

@@ -11,6 +11,7 @@ from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.two_vehicles import TWO_VEHICLES
+from uav_task_alloc.zone_codec import OUTSIDE_AREA
 
 
 class Takeoff:
@@ -82,9 +83,11 @@ class Takeoff:
 
     def _zone_over_start(self) -> str:
         """The zone over its home, or where it stands, that it waits for; '': there is none."""
-        here, zones = self._telemetry.position, self._policy().zones
+        here, zones = self._telemetry.position, self._policy().no_fly_zones
         for place, name in ((self._telemetry.home or here, 'the home'), (here, 'its place')):
             zone = zone_across_path(place, place, zones)
+            if zone is not None and zone.id.startswith(OUTSIDE_AREA):
+                return f'another fence_area: {name} is outside of it'
             if zone is not None:
                 return f'zone {zone.id} to be removed: it covers {name}'
         return ''

@@ -100,14 +100,14 @@ class VehicleFence:
         policy = self._policy()
         if policy.fences == 'off':
             self._was_verified = False
-            return policy.zones
+            return policy.no_fly_zones
         state = self.transfer.state
         if state is FenceState.VERIFIED:
             self._was_verified = True
         elif state not in (FenceState.UNKNOWN, FenceState.UPLOADING):  # not by a readback
             self._was_verified = False
         around = self._was_verified and self.parameters.plans_around and not self.left_out
-        return () if around else policy.zones
+        return () if around else policy.no_fly_zones
 
     @property
     def active(self) -> bool:
@@ -287,7 +287,7 @@ class VehicleFence:
             return ''
         height = max(telemetry.position[2], telemetry.home[2] + self.parameters.return_height)
         crossed = [zone.id for zone in zones_across_path(telemetry.position, telemetry.home, (
-            zone for zone in self._policy().zones
+            zone for zone in self._policy().no_fly_zones
             if vertical_extent(zone)[0] < height < vertical_extent(zone)[1]))]
         return f'zone{"s" * (len(crossed) > 1)} {first_of(crossed)}' if crossed else ''
 
