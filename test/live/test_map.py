@@ -114,14 +114,19 @@ def test_a_uav_points_where_it_flies(shown, course):
     assert page.get_attribute('#map [data-uav=u2] path', 'd').startswith('M-8,0 a8,8')  # a dot
 
 
-def test_what_is_outside_of_the_fence_area_is_covered(shown, run):
+def test_what_is_outside_of_the_fence_area_is_covered_and_named(shown, run):
     corners = [[0.0, 200.0], [600.0, 200.0], [600.0, 600.0], [0.0, 600.0]]
     area = {'kind': 'fence_area', 'wall': BEGIN, 'corners': corners}
     page = shown(Run().add(*FIRST, area), DESK)
     image = pixels(page, '#map canvas')
     edge = image[image.shape[0] // 2, 4]  # left of the area
     assert edge[0] - edge[2] > 0.05
-    assert np.ptp(pixels(shown(run, DESK), '#map canvas')[image.shape[0] // 2, 4]) < 0.05
+    page.hover('#map', position={'x': 4, 'y': image.shape[0] // 2})
+    assert text(page, '#map .tip') == 'outside of fence_area: no plan leads here'
+    page = shown(run, DESK)
+    assert np.ptp(pixels(page, '#map canvas')[image.shape[0] // 2, 4]) < 0.05
+    page.hover('#map', position={'x': 4, 'y': image.shape[0] // 2})
+    assert text(page, '#map .tip') == ''
 
 
 def test_the_map_takes_most_of_the_width_of_a_desk(shown, run):

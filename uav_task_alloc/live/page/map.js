@@ -199,7 +199,10 @@ export class FleetMap {
     if (!this.scene) return;
     const {kind, thing} = this.nearest(x, y), {view, tip, scene} = this, point = view.point(x, y);
     const zone = thing ? null : scene.zones.find(other => isInside(other, point));
-    const text = thing ? scene.words(kind, thing) : zone ? scene.words('zone', zone) : '';
+    const outside = scene.area.length
+      && !isInside({shape: 'POLYGON', vertices: scene.area}, point);
+    const text = thing ? scene.words(kind, thing) : zone ? scene.words('zone', zone)
+      : outside ? 'outside of fence_area: no plan leads here' : '';
     this.readout.textContent = view.frame
       ? `${degreesText(view.frame, point)}  (${metresText(point)})` : metresText(point);
     this.node.classList.toggle('over-thing', Boolean(thing));
