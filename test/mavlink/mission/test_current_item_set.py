@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A current item that we set: when it is sent again, and which reports are of before it."""
 import pytest
-from findings_bench import flying
+from authority_bench import PX4
+from findings_bench import flown_once_each, flying
+from flight_bench import places
+from mission_bench import OURS, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
@@ -65,3 +68,19 @@ def test_a_report_with_the_id_of_the_mission_taken_is_of_it(id_at, old):
     reports.begin(0, 100.0)
     reports.note_id(50, id_at)
     assert reports.is_old(3, id_at, 50) is old
+
+
+@PX4
+def test_what_was_flown_of_an_upload_that_is_sent_again_is_not_flown_twice(kind):
+    bench = flying(kind, 'ABC')
+    ended = d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR)
+    bench.line.tampers.append(lambda direction, m, now: [(0.0, ended)] if (
+        m.get_type() == 'MISSION_ACK' and direction == 'down') else None)
+    bench.assign(task_list('BCA', 2))
+    assert bench.run(lambda: bench.onboard().upload.sent_all)
+    bench.run(limit=2.0)  # its acceptance is lost, and an error of another transfer comes
+    bench.line.tampers[:] = [lambda direction, m, now: [] if (
+        m.get_type() == 'MISSION_COUNT' and direction == 'up') else None]
+    assert bench.run(lambda: places(bench) == ['B'])
+    bench.line.tampers.clear()
+    flown_once_each(bench, 'ABC')

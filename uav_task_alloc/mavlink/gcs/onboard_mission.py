@@ -339,6 +339,10 @@ class OnboardMission:
         elif later > diff.start == current:  # PX4 has flown on during the upload
             self.progress.note_set_current(later, now)
             self.set_current_to = later
+        elif self._profile.atomic and self.upload.sent_before and current is not None and all(
+                item.task in self.progress.completed
+                for item in diff.items[diff.start:current]) and current > diff.start:
+            self.set_current_to = current  # it would fly again what it flew after an earlier try
 
     def _correct(self, held: tuple[Item, ...], now: float) -> bool:
         """Count reports for the items that PX4 has taken, where they are others than were sent."""

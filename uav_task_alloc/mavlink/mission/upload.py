@@ -88,6 +88,7 @@ class Upload:
         self._sent_last = self._accepted = False
         self._empty = 0  # readbacks that were empty, though it was accepted
         self._sent_once = False  # the last item of this mission, in this try or an earlier one
+        self.sent_before = False  # the last item, in an earlier try: it may fly that mission
         self._read_at = -math.inf  # [s] end of a readback; it may not know that (ACK lost)
 
     @property
@@ -178,10 +179,10 @@ class Upload:
     def _begin(self, now: float) -> None:
         if self.state in (UploadState.BACKOFF, UploadState.DRAINING) and self._pending:
             self._mission, self._pending = self._pending, None  # nothing runs: nothing to abort
-            self._tries, self._sent_once = 0, False
+            self._tries, self._sent_once, self.sent_before = 0, False, False
         elif self.state is UploadState.IDLE and self._pending:
             self._mission, self._pending = self._pending, None
-            self._tries, self._sent_once = 0, False
+            self._tries, self._sent_once, self.sent_before = 0, False, False
             self._go(UploadEvent.START, now)
         elif self.state is UploadState.IDLE and self._read_pending:
             self._mission, self._read_pending = None, False
@@ -277,6 +278,7 @@ class Upload:
             return
         if self._counts == 0:
             self.uploads += 1
+            self.sent_before = self._sent_once
             self._sent_last, self._accepted, self._empty = False, False, 0
             self._requested = None
         self._counts += 1
