@@ -6,8 +6,9 @@ from itertools import pairwise
 import pytest
 from hypothesis import assume, given, strategies as st
 
+from uav_task_alloc import Task, Uav, plan
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.fence_area import area_corners, outside_rings
+from uav_task_alloc.geometry.fence_area import area_corners, outside_rings, zones_outside
 from uav_task_alloc.geometry.frames import Origin, to_geodetic
 from uav_task_alloc.geometry.polygon import contains_point, edges, is_simple, signed_area
 from uav_task_alloc.geometry.polyline import segment_distance
@@ -45,6 +46,15 @@ def test_no_leg_leaves_the_area_between_the_two(corners, ax, ay, bx, by):
         if all(not contains_point(ring, p) and min(
                 segment_distance(p, *edge) for edge in edges(ring)) > 0.2 for p in (a, b)):
             assert any(contains_point(each, a) and contains_point(each, b) for each in rings)
+
+
+def test_a_plan_in_python_stays_inside():
+    square = [(0.0, 0.0), (0.0, 500.0), (500.0, 500.0), (500.0, 0.0)]
+    found = plan([Uav('u', (100.0, 100.0, 50.0))], [
+        Task('in', (400.0, 400.0, 50.0)), Task('out', (600.0, 400.0, 50.0))],
+        zones_outside(square), budget=0.01)
+    assert found.routes == {'u': ('in',)}
+    assert zones_outside([]) == ()
 
 
 @pytest.mark.parametrize('order', [1, -1])

@@ -55,17 +55,23 @@ def check_fence_area(corners: Sequence[XY]) -> AreaCorners:
     return checked if signed_area(checked) > 0.0 else checked[::-1]
 
 
-def zones_outside(corners: AreaCorners) -> tuple[ThreatZone, ...]:
+def zones_outside(corners: Sequence[XY]) -> tuple[ThreatZone, ...]:
     """Return zones over all that is outside of the area that a fleet stays in.
 
     Args:
-        corners: [m], counter-clockwise; () where there is no area.
+        corners: (east, north) [m] of a simple polygon, either way round, 20 at most; () for none.
 
     Returns:
-        Two, west and east, at all heights; none where there is no area.
+        Two, west and east, at all heights, for the `zones` of `plan`; none where there is no area.
+
+    Raises:
+        InvalidValue: there are more corners, or the polygon is not simple.
     """
-    return tuple(ThreatZone.polygon(f'{OUTSIDE_AREA} ({side})', ring) for side, ring in zip(
-        ('west', 'east'), outside_rings(corners, _REACH), strict=True)) if corners else ()
+    if not corners:
+        return ()
+    rings = outside_rings(check_fence_area(corners), _REACH)
+    return tuple(ThreatZone.polygon(f'{OUTSIDE_AREA} ({side})', ring)
+                 for side, ring in zip(('west', 'east'), rings, strict=True))
 
 
 def degrees_of(name: str, entry: str) -> tuple[float, float]:
