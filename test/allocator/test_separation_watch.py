@@ -59,6 +59,16 @@ def test_the_one_that_is_later_at_its_next_stop_holds_and_goes_on_when_the_other
     assert sky.core.separation.texts() == {}
 
 
+def test_one_that_holds_for_an_idle_one_says_what_ends_that():
+    sky = Sky(second={'mode': 'HOLD', 'velocity': (0.0, 0.0, 0.0)})
+    sky.world.cancel(['t2'], sky.now, sky.now)
+    sky.settle(report=False)
+    sky.report(south=(0.0, 0.0, 50.0))
+    assert sky.step() == [('u1', True)]
+    assert sky.core.separation.texts()['u1'].endswith(
+        'u1 holds for u2, which has no tasks and stays: a task for it, or its return, ends that')
+
+
 def test_without_a_rule_nothing_is_predicted():
     sky = Sky(separation__horizontal=0.0)
     assert sky.step() == []

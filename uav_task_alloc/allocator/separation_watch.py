@@ -39,6 +39,7 @@ _ASK_AGAIN = 10.0  # [s] between plans for UAVs that hold for each other
 _MOST_SENT = 50  # lists of a UAV that are kept
 _CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
 _FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
+_STAYS = 'has no tasks and stays: a task for it, or its return, ends that'
 _OURS = ('', 'UNKNOWN', 'HELD')  # authority over a UAV in the air that flies its list
 _TimedPoints = list[tuple[float, Point]]
 
@@ -202,15 +203,16 @@ class SeparationWatch:
             return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
                                 f'{uav_id} is low on battery' if record.low else '', early=True)
         points = self._list_points(self._world.list_of(uav_id), stops, flight)
-        to_place = () if stops else self._way_to_place(uav_id, place)
+        to_place, stays = () if stops else self._way_to_place(uav_id, place), ''
         if to_place:
             points = _along([(0.0, place)], to_place, flight.pace, flight.share(to_place[0]))
         elif not stops:
-            waits = mode == 'HOLD' or self._world.list_of(uav_id).waiting_place is not None
+            placed = self._world.list_of(uav_id).waiting_place is not None
+            waits, stays = mode == 'HOLD' or placed, '' if placed else _STAYS
             points = [(0.0, place)] if waits else _drift(record)
         return MonitoredUav(self._way(record, points),
                             (_FLIES, -stops[0].start if stops else -math.inf),
-                            bool(stops or to_place))
+                            bool(stops or to_place), stays=stays)
 
     def _way_to_place(self, uav_id: str, place: Point) -> tuple[Point, ...]:
         """The points ahead on the way to a waiting place; (): it is there, or has none."""

@@ -43,6 +43,7 @@ class MonitoredUav:
     may_hold: bool = True  # it obeys a hold, and none else is in force
     why_not: str = ''  # why it may not
     early: bool = False  # it holds as soon as a loss is predicted: later it cannot, or may not
+    stays: str = ''  # why it does not move, whoever waits for it; '': it does
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +214,7 @@ class SeparationMonitor:
         lesser, greater = sorted(pair, key=lambda name: (uavs[name].claim, name))
         for uav_id, other in ((lesser, greater), (greater, lesser)):
             if self._may_hold(uav_id, other, uavs) and predicted.helps(uav_id, other):
-                self._hold(uav_id, other, pair, current, predicted)
+                self._hold(uav_id, other, pair, current, predicted, uavs[other].stays)
                 return
         self._last_resort(pair, current, uavs, predicted, lesser)
 
@@ -231,8 +232,8 @@ class SeparationMonitor:
                    for other in self._holds[uav_id].waits_for)
 
     def _hold(self, uav_id: str, other: str, pair: UavPair, loss: PredictedLoss,
-              predicted: FlightPredictions) -> None:
-        reason = f'{uav_id} holds for {other}'
+              predicted: FlightPredictions, stays: str) -> None:
+        reason = ', which '.join(filter(None, (f'{uav_id} holds for {other}', stays)))
         self._begin(uav_id, other, reason)
         predicted.set_holding(uav_id, True)
         self._publish(pair, loss, AlertAction.HOLD, uav_id, reason)
