@@ -380,6 +380,8 @@ def test_the_strips_of_an_area_are_drawn_as_flown_and_as_still_to_fly(shown):
         rows('field#2'), reported('COMPLETED'),
         state(BEGIN, 'u1', (100.0, 90.0), active='field#2')), DESK)
     assert find(page, 'field', '1 of 2 pieces of field are flown; u1 flies the rest.')
+    page.click('#uavs details summary')
+    chromium.wait(page, '#uavs details', '1 done, 1 to fly')
     x, y, scale = map(float, page.get_attribute('#map', 'data-view').split())
     image = pixels(page, '#map')
     height, width = image.shape[:2]

@@ -263,6 +263,8 @@ def test_the_health_of_a_uav_is_that_of_the_diagnostics():
               'health': {'u1': [1, 'link stale'], 'u2': [0, 'mission VERIFIED']}}
     parts, _, _ = updates([*FIRST, health])
     assert [parts['uavs'][uav]['health'] for uav in ('u1', 'u2')] == ['link stale', '']
+    parts, _, _ = updates([*FIRST, {**health, 'health': {'u1': [2, '']}}])
+    assert parts['uavs']['u1']['health'] == 'a warning without a text'
 
 
 def test_a_big_fleet_fits_through_the_stream():
@@ -376,13 +378,14 @@ def test_an_area_has_its_outline_its_strips_and_those_that_are_flown():
     parts, _, _ = updates(begin)
     assert parts['works']['field'] == {
         'kind': 'AREA', 'path': FIELD['path'], 'holes': [], 'radius': 0.0, 'done': 0,
-        'pieces': 2, 'strips': []}
+        'pieces': 2, 'strips': [], 'by': {}}
     assert parts['statuses'] == {'field': ['ASSIGNED', 'u1', '0 of 2 strips']}
     first = parts['list u1']['tasks'][0]
     assert (first['id'], first['way']) == ('field#1', [[0.0, 10.0, 40.0], [200.0, 10.0, 40.0]])
     parts, _, _ = updates(begin, [survey(BEGIN + 9.0, 1),
                                   with_ways(listed(BEGIN + 9.0, 'u1', 2, ['field#2']))])
     assert parts['works']['field']['done'] == 1
+    assert parts['works']['field']['by'] == {'u1': 1}
     assert parts['works']['field']['strips'] == [[[0.0, 10.0, 40.0], [200.0, 10.0, 40.0]]]
 
 

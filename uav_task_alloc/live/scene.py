@@ -221,7 +221,8 @@ class Scene:
     def works(self) -> LogEntry:
         """What is no point, by task: `kind`, `path`, `holes`, `radius` [m]; its pieces.
 
-        `strips`: the ways of its completed pieces [m]; `done` of `pieces` are completed.
+        `strips`: the ways of its completed pieces [m]; `done` of `pieces` are completed, so many
+        `by` each UAV.
         """
         run, found = self.run, dict[str, LogEntry]()
         for name, task in run.tasks.items():
@@ -232,11 +233,14 @@ class Scene:
                 'kind': task.work, 'path': [to_decimetres(point) for point in task.path],
                 'holes': [[to_decimetres(point) for point in hole] for hole in task.holes],
                 'radius': task.radius, 'done': status.done if status else 0,
-                'pieces': status.pieces if status else 0, 'strips': []}
+                'pieces': status.pieces if status else 0, 'strips': [], 'by': {}}
         for piece, status in run.pieces.items():
             whole, _ = split_piece(piece)
-            if status.state == 'COMPLETED' and whole in found and piece in run.ways:
-                found[whole]['strips'].append([to_decimetres(p) for p in run.ways[piece]])
+            if status.state == 'COMPLETED' and whole in found:
+                by = found[whole]['by']
+                by[status.uav] = by.get(status.uav, 0) + 1
+                if piece in run.ways:
+                    found[whole]['strips'].append([to_decimetres(p) for p in run.ways[piece]])
         return found
 
     def times(self) -> LogEntry:

@@ -345,7 +345,8 @@ class RunState:
     def trouble(self, uav: str) -> str:
         """What is wrong with a UAV, by its bridge and the allocators; '' where all is well."""
         level, text = self.health.get(uav, (0, ''))
-        return '; '.join([text] * bool(level) + self.allocators.warnings(uav))
+        return '; '.join([text or 'a warning without a text'] * bool(level)
+                         + self.allocators.warnings(uav))
 
     @property
     def uploads(self) -> int:

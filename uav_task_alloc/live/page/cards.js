@@ -71,8 +71,11 @@ export function showUavs(model, centre) {
   put($('uav-count'), model.uavs.length ? String(model.uavs.length) : '');
   if (!model.uavs.length) return;
   const done = new Map(), colours = themeColours();
-  for (const [state, uav] of model.statuses.values()) {
-    if (state === 'COMPLETED') done.set(uav, (done.get(uav) || 0) + 1);
+  const add = (uav, count) => done.set(uav, (done.get(uav) || 0) + count);
+  for (const [id, [state, uav]] of model.statuses) {
+    const by = Object.entries(model.works.get(id)?.by || {});
+    if (by.length) by.forEach(row => add(...row));  // pieces, also of work that is not done
+    else if (state === 'COMPLETED') add(uav, 1);
   }
   fill($('uavs'), JSON.stringify(model.uavs.map(uav => uav.id)),
     () => model.uavs.map(uav => card(uav, centre)));
