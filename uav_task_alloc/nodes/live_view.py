@@ -2,6 +2,7 @@
 """Shows a fleet in the terminal and in the browser, records it, and ends with its scenario."""
 from __future__ import annotations
 
+import select
 import shutil
 import sys
 from collections import deque
@@ -68,6 +69,8 @@ class TerminalStatus:
     def update(self, state: RunState, wall: float, clock: float, last: bool) -> None:
         """Print the state at `wall` [unix s], `clock` [s] of the scenario; `last`: in any case."""
         self._updates += 1
+        if not last and not _takes_text():
+            return
         lines = [headline(state, clock)]
         if sys.stdout.isatty():
             lines += fleet_lines(state, wall)
@@ -78,6 +81,14 @@ class TerminalStatus:
         elif self._updates % _PLAIN_PERIODS and not last:
             return
         print('\n'.join(map(printable, lines)), flush=True)
+
+
+def _takes_text() -> bool:
+    """Whether stdout takes text at once: a stopped terminal (Ctrl-S) would stop the node."""
+    try:
+        return bool(select.select([], [sys.stdout], [], 0.0)[1])
+    except (OSError, ValueError):  # it is no file, or closed
+        return True
 
 
 class LiveView(Node):

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What live_view prints must not stop what it receives."""
+import contextlib
+import os
+from threading import Thread
+
+import pytest
+
+from uav_task_alloc.nodes import live_view
+from uav_task_alloc.record import run_state
+
+pytestmark = pytest.mark.ros
+
+
+def test_a_pipe_that_nobody_reads_does_not_stop_the_node(monkeypatch):
+    end, begin = os.pipe()
+    os.set_blocking(begin, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(begin, bytes(4096))
+    os.set_blocking(begin, True)
+    status, run = live_view.TerminalStatus(), run_state.RunState()
+    with os.fdopen(begin, 'w') as out:
+        monkeypatch.setattr(live_view.sys, 'stdout', out)
+
+        def update():
+            for _ in range(2 * live_view._PLAIN_PERIODS):
+                status.update(run, 0.0, 0.0, False)
+        printing = Thread(target=update, daemon=True)
+        printing.start()
+        printing.join(10.0)
+        hangs = printing.is_alive()
+        os.read(end, 1 << 20)
+        printing.join(10.0)
+        status.update(run, 0.0, 0.0, True)
+    assert not hangs
+    assert b'0 of 0 tasks' in os.read(end, 1 << 20)
+    os.close(end)
