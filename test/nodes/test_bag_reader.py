@@ -98,10 +98,14 @@ def test_the_origin_that_the_fleet_published_is_that_of_the_bag(tmp_path):
 
 def test_the_fence_area_is_the_polygon_of_that_name(tmp_path):
     area = area_message(((0.0, 0.0), (9.0, 0.0), (9.0, 9.0)), 0.0)
-    lines = list(BagReader(write(tmp_path / 'a.mcap', [
-        ('/fence_area', area), ('/field/outline', area), ('/fence_area', area_message((), 0.0))])))
+    many = area_message(tuple((float(k), float(k * k)) for k in range(21)), 0.0)  # nodes take 20
+    reader = BagReader(write(tmp_path / 'a.mcap', [
+        ('/fence_area', area), ('/field/outline', area), ('/fence_area', many),
+        ('/fence_area', area_message((), 0.0))]))
+    lines = list(reader)
     assert [(line['kind'], list(line['corners'])) for line in lines[1:]] == [
         ('fence_area', [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0)]), ('fence_area', [])]
+    assert reader.undecodable == {'/fence_area': 1}
 
 
 def test_a_task_in_degrees_that_was_announced_before_the_origin_has_its_place(tmp_path):

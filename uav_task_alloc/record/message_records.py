@@ -9,8 +9,9 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from uav_task_alloc.checks import FAR, check_number, check_point, check_polygon
+from uav_task_alloc.checks import FAR, check_number, check_point
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.fence_area import check_fence_area
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point
 from uav_task_alloc.piece_ids import piece_id
@@ -166,11 +167,11 @@ def fence_area_record(msg: _Message) -> RecordBody:
         Kind `fence_area`, its corners [m].
 
     Raises:
-        InvalidValue: it has one or two points, or another point than a finite one.
+        InvalidValue: it is no area that nodes take.
     """
     points = [(point.x, point.y) for point in msg.polygon.points]
     return {'kind': 'fence_area',
-            'corners': check_polygon('fence_area', points) if points else ()}
+            'corners': check_fence_area(points) if points else ()}
 
 
 def statuses_record(msg: _Message) -> RecordBody:

@@ -52,8 +52,8 @@ function showMap(model, picked) {
       ...pointsAhead(uav.position, model.waits.get(uav.id))]}));
   const works = [...model.works].map(([id, work]) => ({...work, position: at(id)}))
     .filter(work => work.position && work.position[0] !== null);
-  map.show({origin: model.origin, zones: model.zones, area: model.area, routes, waits, tasks, works,
-    uavs: model.uavs,
+  map.show({origin: model.origin, zones: model.zones, area: model.area, routes, waits, tasks,
+    works, uavs: model.uavs,
     changed: given.filter(id => at(id) && model.turns.has(id)).map(at),
     pickedId: picked, pickedIndex: model.turns.get(picked)?.index,
     picked: at(picked) ? [at(picked)] : [],
