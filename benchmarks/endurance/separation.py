@@ -5,8 +5,9 @@ Run: `python benchmarks/endurance/separation.py --scenes 100 --seed 1 --json`. A
 and monitor are the real ones; up to 20 UAVs of one base or several fly their lists with speeds
 that are up to 20 % off, in a wind that nobody is given; tasks arrive, and one UAV is lost. Each
 scene is flown with 10 m / 5 m, with 30 m / 10 m, and without separation. Losses are judged by true
-positions at 10 Hz, by code that shares nothing with the allocator. The extra flight time is that
-against the same lists flown without heights, waits and holds; against the flight without
+positions at 10 Hz, by code that shares nothing with the allocator. With `--hold` UAVs stay in the
+air after their last tasks, and half of the tasks are for certain UAVs only. The extra flight time
+is that against the same lists flown without heights, waits and holds; against the flight without
 separation, whose plans soon are others, it is `extra_percent_other_plans`. The last line is JSON;
 the status is 1 where separation was lost.
 """
@@ -19,7 +20,7 @@ import random
 import statistics
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -56,8 +57,8 @@ class Scene:
     lost: tuple[float, str] = (math.inf, '')
 
 
-def draw(seed: int) -> Scene:
-    """Draw a scene."""
+def draw(seed: int, hold: bool = False) -> Scene:
+    """Draw a scene; half of its tasks are for a third of the UAVs only where these `hold`."""
     rng = random.Random(seed)
     scene, count = Scene(), rng.randint(3, 20)
     side, bases = rng.uniform(400.0, 1500.0), rng.choice((1, 1, 2, 4))
@@ -79,6 +80,10 @@ def draw(seed: int) -> Scene:
             service_time=rng.choice((0.0, 3.0, 8.0)))))
     scene.tasks.sort(key=lambda row: row[0])
     scene.lost = rng.uniform(20.0, 90.0), rng.choice(sorted(scene.homes))
+    if hold:
+        names, few = sorted(scene.homes), (count + 2) // 3
+        scene.tasks = [(at, replace(task, allowed_uavs=frozenset(rng.sample(names, few))))
+                       if rng.random() < 0.5 else (at, task) for at, task in scene.tasks]
     return scene
 
 
@@ -139,14 +144,15 @@ def same_plan_seconds(scene: Scene, flight: Flight) -> float:
 class Flight:
     """One flight of a scene."""
 
-    def __init__(self, scene: Scene, seed: int, rule: tuple[float, float] | None) -> None:
-        self.scene, self.now = scene, 0.0
+    def __init__(self, scene: Scene, seed: int, rule: tuple[float, float] | None,
+                 hold: bool = False) -> None:
+        self.scene, self.now, self.hold = scene, 0.0, hold
         self.crafts, self.sent = crafts_of(scene), list[SentList]()
         horizontal, vertical = rule or (0.0, 5.0)
         self.core = Allocator(AllocatorParams(
-            route_end='home', seed=seed % 2**31, background_period=5.0, uav_timeout=3.0,
-            default_cruise_speed=SPEED, separation__horizontal=horizontal,
-            separation__vertical=vertical), self.stamp)
+            route_end='hold' if hold else 'home', seed=seed % 2**31, background_period=5.0,
+            uav_timeout=3.0, default_cruise_speed=SPEED,
+            separation__horizontal=horizontal, separation__vertical=vertical), self.stamp)
         self.core.set_kernels_ready()
         self.judges = [Judge(*each) for each in ((rule,) if rule else RULES)]
         self.left = list(scene.tasks)
@@ -177,9 +183,9 @@ class Flight:
         return self
 
     def over(self) -> bool:
-        """Whether all are on the ground and no task is being flown."""
-        return all(craft.landed or craft.dead for craft in self.crafts.values()) and not any(
-            record.uav for record in self.core.world.tasks.open())
+        """Whether all are on the ground, or stay, and no task is being flown."""
+        return all(craft.landed or craft.dead or self.hold for craft in self.crafts.values()
+                   ) and not any(record.uav for record in self.core.world.tasks.open())
 
     def allocate(self) -> None:
         """What the allocator does in a tick, with the solve at once."""
@@ -217,17 +223,17 @@ class Flight:
         return len(set().union(*(craft.done for craft in self.crafts.values())))
 
 
-def fly(seed: int, verbose: bool) -> dict[str, object]:
+def fly(seed: int, verbose: bool, hold: bool) -> dict[str, object]:
     """Fly a scene three times; its figures."""
-    scene = draw(seed)
-    without = Flight(scene, seed, None).run()
+    scene = draw(seed, hold)
+    without = Flight(scene, seed, None, hold).run()
     found = {'seed': seed, 'uavs': len(scene.homes), 'tasks': len(scene.tasks),
              'losses_without': sum(judge.losses for judge in without.judges),
              'losses': 0, 'least': [], 'extra': [], 'extra_other': [],
              'holds': 0, 'undone': 0, 'unresolved': 0,
              'late': int(not without.over())}
     for rule in RULES:
-        flight = Flight(scene, seed, rule).run()
+        flight = Flight(scene, seed, rule, hold).run()
         judge = flight.judges[0]
         found['losses'] += judge.losses
         found['least'].append(round(judge.least, 2))
@@ -248,11 +254,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or '').split('\n')[0])
     parser.add_argument('--scenes', type=int, default=20)
     parser.add_argument('--seed', type=int, default=1, help='of the first scene')
+    parser.add_argument('--hold', action='store_true', help='UAVs stay after their last tasks')
     parser.add_argument('--json', action='store_true', help='only the last line')
     args = parser.parse_args()
     rows = []
     for seed in range(args.seed, args.seed + args.scenes):
-        rows.append(fly(seed, not args.json))
+        rows.append(fly(seed, not args.json, args.hold))
         if not args.json:
             print(json.dumps(rows[-1]), flush=True)
     extra, other = ([share for row in rows for share in row[key]]

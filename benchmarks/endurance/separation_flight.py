@@ -54,6 +54,7 @@ class Craft:
     orders: list[tuple[float, object]] = field(default_factory=list)  # lists and holds under way
     started: set[str] = field(default_factory=set)
     done: set[str] = field(default_factory=set)
+    goes_home: bool = False  # its list ends with a return
 
     def receive(self, order: object, now: float) -> None:
         """Take a list or a hold, which is flown after the delay of the link."""
@@ -73,8 +74,9 @@ class Craft:
 
     @property
     def returns(self) -> bool:
-        """Whether no task is left."""
-        return bool(self.legs) and not self.serving and not any(leg.task for leg in self.legs)
+        """Whether no task is left, and it flies home."""
+        return self.goes_home and bool(self.legs) and not self.serving and not any(
+            leg.task for leg in self.legs)
 
     @property
     def descends(self) -> bool:
@@ -107,7 +109,7 @@ class Craft:
             self.held = order
             return
         assert isinstance(order, UavList)
-        self.revision = order.revision
+        self.revision, self.goes_home = order.revision, order.returns
         stops = [stop for stop in order.stops if stop.task.id not in self.done]
         if self.serving and stops and stops[0].task.id == self.serving:
             stops = stops[1:]
@@ -125,6 +127,8 @@ class Craft:
             above = (*self.home[:2], max(top, self.home[2] + 5.0))
             legs += [Leg(above)] if not legs or legs[-1].point != above else []
             legs.append(Leg(self.home, lands=True))
+        elif not (legs or self.landed):  # to a waiting place, where there is one
+            legs += [Leg(point) for point in order.end_via]
         waits = bool(self.waiting[0]) and now < self.until
         if (not self.legs and not self.landed) or self.climbing or self.serving or waits:
             self.legs = legs  # no leg is under way

@@ -66,7 +66,8 @@ def test_one_that_holds_for_an_idle_one_says_what_ends_that():
     sky.report(south=(0.0, 0.0, 50.0))
     assert sky.step() == [('u1', True)]
     assert sky.core.separation.texts()['u1'].endswith(
-        'u1 holds for u2, which has no tasks and stays: a task for it, or its return, ends that')
+        'u1 holds for u2, which has no tasks: it gives way where that is safe, else a task or '
+        'its return ends that')
 
 
 def test_without_a_rule_nothing_is_predicted():

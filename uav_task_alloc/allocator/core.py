@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 
 from uav_task_alloc.allocator.battery_watch import BatteryWatch
+from uav_task_alloc.allocator.giving_way import GivingWay
 from uav_task_alloc.allocator.persistence import unsaved_rows
 from uav_task_alloc.allocator.plan_publisher import PlanPublisher
 from uav_task_alloc.allocator.records import Outbox, SavedState
@@ -73,6 +74,7 @@ class Allocator:
         self.batteries = BatteryWatch(self.world)
         self.waiting = WaitingPlaces(self.world)
         self._changes = BatteryChanges(self.world, self.waiting)
+        self._giving_way = GivingWay(self.world, self.waiting, self.separation)
         self._best = Plan({each.uav: each.task_ids for each in saved.lists}, reversed=frozenset(
             stop.task.id for each in saved.lists for stop in each.stops if stop.reversed))
         self._learned = saved.learned
@@ -118,11 +120,12 @@ class Allocator:
             self._publisher.step_tasks(stamp)
 
     def _wait_for_tasks(self, now: float, stamp: float) -> None:
-        """Send idle UAVs to waiting places, not while a plan may give them tasks."""
+        """Send idle UAVs to waiting places, or out of the way, not while a plan may use them."""
         world, lists = self.world, self.waiting.ended(now)
         if not (self.schedule.busy or self.schedule.triggers):
             self._changes.send(now, stamp)
-            lists = {**self.waiting.chosen(now, stamp), **lists}
+            lists = {**self.waiting.chosen(now, stamp), **lists,
+                     **self._giving_way.lists(now, stamp)}
         published = world.publish(lists, stamp)
         if published:
             texts = self.waiting.texts()

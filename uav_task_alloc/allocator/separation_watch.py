@@ -27,7 +27,7 @@ from uav_task_alloc.separation.monitor import (
     MonitorStep,
     SeparationMonitor,
 )
-from uav_task_alloc.separation.prediction import HORIZON, Way
+from uav_task_alloc.separation.prediction import HORIZON, FlightPredictions, Way
 from uav_task_alloc.separation.rule import FORGOTTEN
 
 _PERIOD = 0.5  # [s] of the published clock between two steps
@@ -40,6 +40,7 @@ _MOST_SENT = 50  # lists of a UAV that are kept
 _CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
 _FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
 _STAYS = 'has no tasks and stays: a task for it, or its return, ends that'
+_GIVES_WAY = 'has no tasks: it gives way where that is safe, else a task or its return ends that'
 _OURS = ('', 'UNKNOWN', 'HELD')  # authority over a UAV in the air that flies its list
 _TimedPoints = list[tuple[float, Point]]
 
@@ -55,6 +56,7 @@ class SeparationWatch:
         self._world, self.monitor = world, SeparationMonitor()
         self._stepped = self._asked = -math.inf  # [s] published clock; of the last plan asked for
         self._silent: dict[str, float] = {}  # by id: published clock [s] when it was found silent
+        self._uavs: dict[str, MonitoredUav] = {}  # of the last step, by id
         # by id and revision: lists in force, and before, that may be on board
         self._sent: dict[str, dict[int, UavList]] = {}
 
@@ -77,6 +79,7 @@ class SeparationWatch:
         self._note_lists()
         uavs = {uav_id: each for uav_id, record in self._world.uav_records().items()
                 if (each := self._monitored(uav_id, record, stamp)) is not None}
+        self._uavs = uavs
         step = self.monitor.step(stamp, uavs, rule)
         for alert in step.alerts:
             self._world.note(alert.text, warning=alert.action in (AlertAction.HOLD,
@@ -106,6 +109,39 @@ class SeparationWatch:
                 for uav_id in pair:
                     found[uav_id] = '; '.join(filter(None, (found.get(uav_id), alert.text)))
         return found
+
+    def waited_for(self) -> dict[str, str]:
+        """Return the UAVs that keep another one from going on, by id the id of one of those.
+
+        With both of two for which no hold keeps them apart, where the allocator flies both.
+        """
+        found = {other: uav_id for uav_id, others in sorted(self.monitor.waits.items())
+                 for other in others}
+        for pair, alert in self.monitor.alerts.items():
+            if alert.action is AlertAction.UNRESOLVED and all(
+                    name in self._uavs and self._uavs[name].claim[0] < _HELD for name in pair):
+                found |= dict(zip(pair, pair[::-1], strict=True))
+        return found
+
+    def is_free(self, uav_id: str, line: Sequence[Point]) -> bool:
+        """Return whether a UAV loses separation to nobody where it flies along a line, and stays.
+
+        Args:
+            uav_id: of a UAV in flight, as of the last step.
+            line: [m] ENU.
+
+        Returns:
+            For the next 30 s, in which those that hold go on holding.
+        """
+        flight = self._world.flights.of(uav_id, self._stepped)
+        if flight is None or uav_id not in self._uavs:
+            return False
+        points = _along([(0.0, flight.position)], line, flight.pace)
+        ways = {name: each.way for name, each in self._uavs.items()}
+        ways[uav_id] = replace(ways[uav_id], points=tuple(points))
+        predicted = FlightPredictions(ways, separation_of(self._world.params),
+                                      self.monitor.holding)
+        return not predicted.losses_of(uav_id, holds=False, wide=True)
 
     def _monitored(self, uav_id: str, record: UavRecord, stamp: float
                    ) -> MonitoredUav | None:
@@ -208,7 +244,8 @@ class SeparationWatch:
             points = _along([(0.0, place)], to_place, flight.pace, flight.share(to_place[0]))
         elif not stops:
             placed = self._world.list_of(uav_id).waiting_place is not None
-            waits, stays = mode == 'HOLD' or placed, '' if placed else _STAYS
+            waits = mode == 'HOLD' or placed
+            stays = _GIVES_WAY if self._world.params.approval == 'none' else _STAYS
             points = [(0.0, place)] if waits else _drift(record)
         return MonitoredUav(self._way(record, points),
                             (_FLIES, -stops[0].start if stops else -math.inf),

@@ -239,6 +239,9 @@ def _of_legs(owner: Ints, legs: Ints, pairs: Ints, figures: Floats) -> list[Foun
 class AcceptedRows:
     """The pieces that new ones must be apart from: a table that grows.
 
+    Args:
+        rule: that is on.
+
     Arguments of methods:
         rows: of COLUMNS numbers each.
         owner: indices of the flight and of its leg.

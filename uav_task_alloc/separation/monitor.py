@@ -129,6 +129,11 @@ class SeparationMonitor:
         return {uav_id: hold.reason for uav_id, hold in self._holds.items()}
 
     @property
+    def waits(self) -> Mapping[str, frozenset[str]]:
+        """Ids of the UAVs that each one that holds waits for, by its id."""
+        return {uav_id: frozenset(hold.waits_for) for uav_id, hold in self._holds.items()}
+
+    @property
     def stuck(self) -> frozenset[str]:
         """Ids of UAVs that hold for one that holds for them: only other lists let them go on."""
         return frozenset(name for name, hold in self._holds.items() if any(

@@ -58,6 +58,9 @@ def end_rows(flight: Flight, rule: Separation, end: float, place: Point) -> list
         rule: see `leg_rows`.
         end: [s] of its last leg.
         place: [m] ENU where it stays.
+
+    Returns:
+        One piece without an end, in parts; none where more legs follow.
     """
     rows: list[PieceRow] = []
     if not flight.goes_on:

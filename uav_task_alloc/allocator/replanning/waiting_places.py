@@ -53,6 +53,7 @@ class WaitingPlaces:
         self._event: object = None  # what the last choice was made for
         self._choice: WaitingChoice | None = None  # imported once it is wanted: it loads kernels
         self._stays: dict[str, str] = {}  # why a UAV was not sent, by id
+        self._gives_way: dict[str, tuple[str, Point]] = {}  # for whom, and the place, by id
 
     @property
     def on(self) -> bool:
@@ -68,8 +69,25 @@ class WaitingPlaces:
         for uav_id, each in sorted(self._world.lists_in_force().items()):
             if each.waiting_place is not None:
                 x, y, z = each.waiting_place
-                found[uav_id] = f'waits at ({x:.0f}, {y:.0f}, {z:.0f}) m for demand'
+                other = self._gives_way_to(each)
+                found[uav_id] = f'waits at ({x:.0f}, {y:.0f}, {z:.0f}) m ' + (
+                    f'to give way to {other}' if other else 'for demand')
         return found
+
+    def give_way(self, uav_id: str, other: str, place: Point) -> None:
+        """Note that a list leads a UAV out of the way: it stays there without `anticipate`, too.
+
+        Args:
+            uav_id: of the UAV.
+            other: id of the UAV that it gives way to.
+            place: [m] ENU, the last point of the list.
+        """
+        self._gives_way[uav_id] = other, place
+
+    def _gives_way_to(self, each: UavList) -> str:
+        """Whom a UAV gives way to by a list; '': nobody."""
+        other, place = self._gives_way.get(each.uav, ('', None))
+        return other if each.waiting_place == place else ''
 
     def ended(self, now: float) -> dict[str, UavList]:
         """Return empty lists for UAVs that are not to fly to their places any more."""
@@ -85,7 +103,7 @@ class WaitingPlaces:
 
     def _why_ended(self, each: UavList) -> str:
         record = self._world.uav_record(each.uav)
-        if not self.on:
+        if not (self.on or self._gives_way_to(each)):
             return 'no waiting places are wanted'
         if record is None or not self._world.kernels_ready:
             return ''  # after a restart: it has not reported yet
@@ -181,8 +199,8 @@ class WaitingPlaces:
             uav_id: (self._height(uav_id), *self._reach(uav_id)) for uav_id in idle},
             self._others(idle, stamp), self._present(idle), world.paths(), stamp)
         for uav_id, place in places.items():
-            each = self._list_to(uav_id, place)
-            why = (self._why_not(each) if each is not None else 'no safe way') or (
+            each = self.list_to(uav_id, place)
+            why = (self.why_out_of_reach(each) if each is not None else 'no safe way') or (
                 self._conflict(each, lists, stamp) if each is not None else '')
             self._stays.pop(uav_id, None)
             if why or each is None:
@@ -239,8 +257,16 @@ class WaitingPlaces:
                           world.uav(uav_id).cruise_speed))
         return found
 
-    def _list_to(self, uav_id: str, place: Point) -> UavList | None:
-        """A list that leads a UAV to a place; None: no safe way was found."""
+    def list_to(self, uav_id: str, place: Point) -> UavList | None:
+        """Return a list that leads a UAV to a place.
+
+        Args:
+            uav_id: of a UAV in flight.
+            place: [m] ENU; where it is higher, the UAV climbs first.
+
+        Returns:
+            None: no safe way was found.
+        """
         world = self._world
         start = world.uav_records()[uav_id].report.position
         up = (start[0], start[1], place[2])
@@ -256,16 +282,20 @@ class WaitingPlaces:
             return None
         return replace(world.list_of(uav_id), end_via=(*climb, *via, place), distance=0.0)
 
-    def _why_not(self, each: UavList) -> str:
-        """Why the battery of a UAV does not allow a place; '': it does."""
+    def why_out_of_reach(self, each: UavList, share: float = _SHARE) -> str:
+        """Return why the battery of a UAV does not allow a place; '': it does.
+
+        Args:
+            each: list that leads there.
+            share: of what the battery has above the reserve that the way there and home may take.
+        """
         world, record = self._world, self._world.uav_records()[each.uav]
         place = each.end_via[-1]
         home = world.paths().leg(place, record.home)
         if home is None:
             return 'no safe way home from its place'
         way = polyline_length((record.report.position, *each.end_via))
-        metres, _ = self._reach(each.uav)
-        return '' if way + home.length <= metres else 'battery'
+        return '' if way + home.length <= share * self.metres(each.uav) else 'battery'
 
     def _conflict(self, each: UavList, sent: dict[str, UavList], stamp: float) -> str:
         """With which UAV the way to a place, and waiting there, is in conflict; '': none."""
