@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """An idle UAV in the way of one that holds for it flies elsewhere, and stays in doubt."""
 import math
+from dataclasses import replace
 
 import pytest
 from allocation import AllocatorDriver
@@ -167,3 +168,37 @@ def test_it_leaves_for_one_that_may_not_hold():
         spot.take()
     assert spot.place is not None
     assert abs(spot.place[1]) > 20.0  # beside its way
+
+
+def test_one_that_holds_for_one_that_waits_for_it_by_its_list_goes_on():
+    """u2 waits 20.5 m beside the way of u1: by plans that is enough, by the monitor it is not."""
+    driver = AllocatorDriver(**RULE)
+    places = {'u1': (-90.0, 0.0, 50.0), 'u2': (0.0, 20.5, 50.0)}
+
+    def report(speed=0.0):
+        for uav_id, place in places.items():
+            driver.uav(uav_id, *place, mode='ON_MISSION', authority='HELD', cruise_speed=10.0,
+                       velocity=(speed if uav_id == 'u1' else 0.0, 0.0, 0.0))
+
+    report(10.0)
+    driver.add(Task('t0', places['u2'], allowed_uavs=frozenset({'u2'})),
+               Task('t1', (200.0, 0.0, 50.0), allowed_uavs=frozenset({'u1'})),
+               Task('t2', (0.0, -300.0, 50.0), allowed_uavs=frozenset({'u2'})))
+    driver.settle(report=False)
+    lists = driver.world.lists.lists
+    first, later = lists['u2'].stops
+    lists['u2'] = replace(lists['u2'], stops=(first, replace(
+        later, begin_after=driver.now + 100.0)))
+    driver.event('COMPLETED', 't0', 'u2')
+    holds = []
+    for _ in range(60):
+        driver.now += 0.5
+        report(0.0 if holds else 10.0)
+        driver.settle(report=False)
+        holds += driver.core.separate(driver.now, driver.now).holds
+        if holds and not holds[-1].hold:
+            break
+    assert [(hold.uav, hold.hold) for hold in holds][:1] == [('u1', True)]
+    assert 'u1, u2 wait for each other' in ' '.join(driver.solves)
+    assert not holds[-1].hold  # it flies past below or above
+    assert all(abs(z - 50.0) > 9.5 for _, _, z in driver.world.list_of('u1').stops[0].leg.via[-1:])

@@ -14,13 +14,21 @@ from dataclasses import replace
 from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.state.fleet import UavRecord
-from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.flight_pace import UavFlight
 from uav_task_alloc.allocator.state.stop_times import timed_stops
-from uav_task_alloc.allocator.state.way_times import timed_points
 from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.allocator.timed_ways import (
+    MOVES,
+    TimedPoints,
+    seems_to_return,
+    timed_along,
+    timed_drift,
+    timed_home,
+    timed_own_return,
+    top_of_climb,
+)
 from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Point
-from uav_task_alloc.params import BridgeParams
 from uav_task_alloc.separation.monitor import (
     AlertAction,
     MonitoredUav,
@@ -33,16 +41,13 @@ from uav_task_alloc.separation.rule import FORGOTTEN
 _PERIOD = 0.5  # [s] of the published clock between two steps
 _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
-_MOVES, _CLIMBS = 2.0, 0.5  # [m/s] more than that: it does not hover; it does not fly level
-_TOWARDS = math.cos(math.radians(15.0))  # of the course and the direction of home
-_ASK_AGAIN = 10.0  # [s] between plans for UAVs that hold for each other
+_ASK_AGAIN = 10.0  # [s] between plans for UAVs that wait for each other
+_PATIENCE = 10.0  # [s] for which one that waits by its list is waited for
 _MOST_SENT = 50  # lists of a UAV that are kept
-_CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
 _FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
 _STAYS = 'has no tasks and stays: a task for it, or its return, ends that'
 _GIVES_WAY = 'has no tasks: it gives way where that is safe, else a task or its return ends that'
 _OURS = ('', 'UNKNOWN', 'HELD')  # authority over a UAV in the air that flies its list
-_TimedPoints = list[tuple[float, Point]]
 
 
 class SeparationWatch:
@@ -56,6 +61,8 @@ class SeparationWatch:
         self._world, self.monitor = world, SeparationMonitor()
         self._stepped = self._asked = -math.inf  # [s] published clock; of the last plan asked for
         self._silent: dict[str, float] = {}  # by id: published clock [s] when it was found silent
+        # [s] published clock, by ids of a UAV that holds and of one that waits by its list
+        self._both_wait: dict[tuple[str, str], float] = {}
         self._uavs: dict[str, MonitoredUav] = {}  # of the last step, by id
         # by id and revision: lists in force, and before, that may be on board
         self._sent: dict[str, dict[int, UavList]] = {}
@@ -86,20 +93,31 @@ class SeparationWatch:
                                                                   AlertAction.UNRESOLVED))
         for one, other in step.unresolved:
             self._world.request_replan(f'{one} and {other} lose separation', now)
-        self._world.stuck = self.monitor.stuck
+        self._world.stuck = self.monitor.stuck | self._waiting_for_held(stamp)
         if self._world.stuck and not 0.0 <= stamp - self._asked < _ASK_AGAIN:
             self._asked = stamp
-            self._world.request_replan(f'{", ".join(sorted(self._world.stuck))} hold for each '
+            self._world.request_replan(f'{", ".join(sorted(self._world.stuck))} wait for each '
                                        'other', now)
         return step
 
+    def _waiting_for_held(self, stamp: float) -> frozenset[str]:
+        """UAVs that hold for one that waits by its list, perhaps for them, and those."""
+        waiting = {uav_id for uav_id in self._uavs if (
+            flight := self._world.flights.of(uav_id, stamp)) is not None and flight.waiting}
+        pairs = {(uav_id, other) for uav_id, others in self.monitor.waits.items()
+                 for other in others & waiting}
+        self._both_wait = {pair: self._both_wait.get(pair, stamp) for pair in pairs}
+        return frozenset(name for pair, since in self._both_wait.items()
+                         if stamp - since > _PATIENCE for name in pair)
+
     def clock_jumped(self, by: float) -> None:
-        """Shift since when UAVs are silent with the published clock.
+        """Shift since when UAVs are silent, or wait for each other, with the published clock.
 
         Args:
             by: [s] of the jump.
         """
         self._silent.update((uav_id, stamp + by) for uav_id, stamp in self._silent.items())
+        self._both_wait.update((pair, stamp + by) for pair, stamp in self._both_wait.items())
 
     def texts(self) -> dict[str, str]:
         """Return what is predicted for each UAV, by id."""
@@ -136,7 +154,7 @@ class SeparationWatch:
         flight = self._world.flights.of(uav_id, self._stepped)
         if flight is None or uav_id not in self._uavs:
             return False
-        points = _along([(0.0, flight.position)], line, flight.pace)
+        points = timed_along([(0.0, flight.position)], line, flight.pace)
         ways = {name: each.way for name, each in self._uavs.items()}
         ways[uav_id] = replace(ways[uav_id], points=tuple(points))
         predicted = FlightPredictions(ways, separation_of(self._world.params),
@@ -162,8 +180,9 @@ class SeparationWatch:
         if record.silent or report.foreign or report.mode == 'FAULT' or (
                 report.authority not in _OURS):
             why = 'is silent' if record.silent else 'is not flown by the allocator'
-            points = (_own_return(record, flight.pace) if not silent and _seems_to_return(record)
-                      else _drift(record, silent))
+            points = (timed_own_return(record, flight.pace)
+                      if not silent and seems_to_return(record)
+                      else timed_drift(record, silent))
             return MonitoredUav(self._way(record, points), (_FOREIGN,), False, f'{uav_id} {why}')
         if is_held:
             return MonitoredUav(self._way(record, [(0.0, report.position)]), (_HELD,), False,
@@ -187,7 +206,7 @@ class SeparationWatch:
                         len(kept) > _MOST_SENT and revision not in (reported, current.revision)):
                     del kept[revision]
 
-    def _on_board(self, uav_id: str, record: UavRecord, flight: UavFlight) -> _TimedPoints:
+    def _on_board(self, uav_id: str, record: UavRecord, flight: UavFlight) -> TimedPoints:
         """Where a UAV is until the list in force is on board; []: it is, or nothing is known.
 
         During an upload, which may take long or begin again, one autopilot flies its mission on,
@@ -227,10 +246,11 @@ class SeparationWatch:
         # one on its way home that got a task turns round within seconds
         returns = not stops and (mode == 'RETURNING' or self._world.list_of(uav_id).returns)
         if mode == 'TAKEOFF':  # whatever follows; for how long is not known
-            top = _climbed(record, stops[0].entry[2] if stops else place[2])
+            top = top_of_climb(record, stops[0].entry[2] if stops else place[2])
             points = [(0.0, place), (flight.pace.seconds((place, top)), top)]
             if returns:
-                points = _home(points, record, flight.pace, self._world.list_of(uav_id).end_via)
+                points = timed_home(points, record, flight.pace,
+                                    self._world.list_of(uav_id).end_via)
             return MonitoredUav(self._way(record, points), (_URGENT,), False,
                                 f'{uav_id} takes off')
         if record.low or returns:
@@ -241,12 +261,12 @@ class SeparationWatch:
         points = self._list_points(self._world.list_of(uav_id), stops, flight)
         to_place, stays = () if stops else self._way_to_place(uav_id, place), ''
         if to_place:
-            points = _along([(0.0, place)], to_place, flight.pace, flight.share(to_place[0]))
+            points = timed_along([(0.0, place)], to_place, flight.pace, flight.share(to_place[0]))
         elif not stops:
             placed = self._world.list_of(uav_id).waiting_place is not None
             waits = mode == 'HOLD' or placed
             stays = _GIVES_WAY if self._world.params.approval == 'none' else _STAYS
-            points = [(0.0, place)] if waits else _drift(record)
+            points = [(0.0, place)] if waits else timed_drift(record)
         return MonitoredUav(self._way(record, points),
                             (_FLIES, -stops[0].start if stops else -math.inf),
                             bool(stops or to_place), stays=stays)
@@ -254,20 +274,20 @@ class SeparationWatch:
     def _way_to_place(self, uav_id: str, place: Point) -> tuple[Point, ...]:
         """The points ahead on the way to a waiting place; (): it is there, or has none."""
         each = self._world.list_of(uav_id)
-        if each.waiting_place is None or math.dist(place, each.waiting_place) < _MOVES:
+        if each.waiting_place is None or math.dist(place, each.waiting_place) < MOVES:
             return ()
         return each.end_via[points_passed(place, each.end_via):]
 
-    def _way_home(self, each: UavList, record: UavRecord, flight: UavFlight) -> _TimedPoints:
+    def _way_home(self, each: UavList, record: UavRecord, flight: UavFlight) -> TimedPoints:
         """The points of a list on the way home that are ahead, else its own return."""
         via, place = each.end_via, flight.position
         if not via:
-            return _own_return(record, flight.pace)
+            return timed_own_return(record, flight.pace)
         ahead = via[flight.passed(via):]
         share = flight.share(ahead[0] if ahead else (*record.home[:2], place[2]))
-        return _home([(0.0, place)], record, flight.pace, ahead, share)
+        return timed_home([(0.0, place)], record, flight.pace, ahead, share)
 
-    def _way(self, record: UavRecord, points: _TimedPoints) -> Way:
+    def _way(self, record: UavRecord, points: TimedPoints) -> Way:
         report = record.report
         return Way(tuple(points), math.hypot(*(report.velocity or (0.0,))),
                    report.standby, report.hold_radius, record.home)
@@ -278,7 +298,7 @@ class SeparationWatch:
                      if self._world.tasks.is_open(stop.task.id))
 
     def _list_points(self, each: UavList, stops: Sequence[ListStop], flight: UavFlight,
-                     climbs: bool = False) -> _TimedPoints:
+                     climbs: bool = False) -> TimedPoints:
         """Where a UAV is and when [s from now], along the stops of a list in the next 30 s."""
         record = self._world.uav_records()[each.uav]
         place = flight.position
@@ -295,77 +315,15 @@ class SeparationWatch:
                 leg = leg[flight.passed(leg):]
                 share = 0.0 if climbs or clock > 0.0 else flight.share(leg[0])
                 if climbs:
-                    top = _climbed(record, leg[0][2])
+                    top = top_of_climb(record, leg[0][2])
                     clock += flight.pace.seconds((place, top))
                     points += [(clock, top), (clock + _SETS_OUT, top)]
                     place, clock = top, clock + _SETS_OUT
-            points = _along([*points, (clock, place)], leg, flight.pace, share)
+            points = timed_along([*points, (clock, place)], leg, flight.pace, share)
             place = stop.exit
             clock = points[-1][0] + max(0.0, stop.task.stay - stop.served)
             clock += 0.0 if waits_before else stop.wait
             points.append((clock, place))
             if clock > HORIZON:
                 return points
-        return _home(points, record, flight.pace, each.end_via) if each.returns else points
-
-
-def _climbed(record: UavRecord, height: float) -> Point:
-    """Where a take-off ends: the bridge climbs to its own height, whatever the leg."""
-    x, y, z = record.report.position
-    rise = (record.report.velocity or (0.0, 0.0, 0.0))[2]
-    top = record.report.takeoff_height or BridgeParams.cruise_altitude
-    return x, y, max(z + _CLIMBS_ON * rise, height, record.home[2] + top)
-
-
-def _along(points: _TimedPoints, line: Sequence[Point], pace: FlightPace,
-           share: float = 0.0) -> _TimedPoints:
-    """The points, and then those of a leg, from a share of its speed to a stop."""
-    clock, place = points[-1]
-    return [*points, *((clock + t, point)
-                       for t, point in timed_points((place, *line), pace, share))]
-
-
-def _home(points: _TimedPoints, record: UavRecord, pace: FlightPace,
-          via: Sequence[Point] = (), share: float = 0.0) -> _TimedPoints:
-    """The points, and then the way home at the height of the last one, and down."""
-    place, home = points[-1][1], record.home
-    above = (home[0], home[1], max(home[2], (via[-1] if via else place)[2]))
-    clock, place = (points := _along(points, (*via, above), pace, share))[-1]
-    return [*points, (clock + pace.seconds((place, home)), home)]
-
-
-def _seems_to_return(record: UavRecord) -> bool:
-    """Whether a UAV that others fly climbs to the height of its return, or flies to its home."""
-    report, home = record.report, record.home
-    x, y, z = report.position
-    vx, vy, vz = report.velocity or (0.0, 0.0, 0.0)
-    speed, far = math.hypot(vx, vy), math.hypot(home[0] - x, home[1] - y)
-    if report.mode == 'RETURNING':
-        return True
-    if speed < _MOVES:
-        return vz > _CLIMBS and z < home[2] + (report.return_height or 0.0)
-    return vx * (home[0] - x) + vy * (home[1] - y) > _TOWARDS * speed * far
-
-
-def _own_return(record: UavRecord, pace: FlightPace) -> _TimedPoints:
-    """The way of an autopilot's return mode: up to its own height, home, and down."""
-    report, home = record.report, record.home
-    (x, y, z), (vx, vy, vz) = report.position, report.velocity or (0.0, 0.0, 0.0)
-    top = max(z, home[2] + (report.return_height or 0.0))
-    if math.hypot(vx, vy) > _MOVES and vz < _CLIMBS:  # it has climbed
-        top = z
-    up = (x, y, top)
-    share = min(1.0, math.hypot(vx, vy) / pace.speed) if top == z else 0.0
-    return _home([(0.0, report.position), (pace.seconds((report.position, up)), up)], record,
-                 pace, share=share)
-
-
-def _drift(record: UavRecord, age: float = 0.0) -> _TimedPoints:
-    """Where its velocity takes a UAV, down to the height of its home, `age` [s] after a report."""
-    x, y, z = record.report.position
-    vx, vy, vz = record.report.velocity or (0.0, 0.0, 0.0)
-    low = min(z, record.home[2])
-    x, y, z = x + vx * age, y + vy * age, max(low, z + vz * age)
-    ends = [HORIZON] if z + vz * HORIZON >= low else [(low - z) / vz, HORIZON]
-    return [(0.0, (x, y, z)), *((t, (x + vx * t, y + vy * t, max(low, z + vz * t)))
-                                for t in ends)]
+        return timed_home(points, record, flight.pace, each.end_via) if each.returns else points

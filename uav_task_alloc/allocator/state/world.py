@@ -91,7 +91,7 @@ class World:
         self._kept = -1, -1  # `keep_ended`, and how many had ended when it was applied
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
-        self.stuck: frozenset[str] = frozenset()  # UAVs that hold for one that holds for them
+        self.stuck: frozenset[str] = frozenset()  # UAVs that wait for one that waits for them
         self.tasks, self.orders = TaskRegistry(saved.tasks), Orders(saved.orders)
         self.fleet = Fleet(saved.switched_off, {
             record.uav: record.task.id for record in saved.tasks
