@@ -114,6 +114,29 @@ def test_one_that_is_low_on_battery_or_lands_keeps_its_way():
     assert sky.step() == [('u2', True)]
 
 
+@pytest.mark.parametrize(('first', 'second', 'holder'), [
+    (0.17, 0.15, 'u1'), (0.15, 0.17, 'u2'), (0.15, 0.03, 'u1'), (0.03, 0.15, 'u2')])
+def test_of_two_that_are_low_on_battery_the_one_with_more_left_holds(first, second, holder):
+    """40 km with a full battery and a reserve of 20 %: 3 % are 1.2 km, too little to hold."""
+    def low(battery):
+        return {'battery': battery, 'range': 40_000.0 * battery, 'full_range': 40_000.0}
+
+    sky = Sky({'home': (200.0, 0.0, 0.0), **low(first)},
+              {'home': (0.0, 200.0, 0.0), **low(second)}, battery_reserve=0.2)
+    assert sky.step() == [(holder, True)]
+    sky.report((-60.0, 0.0, 50.0), (0.0, 40.0, 50.0))
+    assert sky.step() == [(holder, False)]
+
+
+def test_two_that_are_low_on_battery_and_cannot_hold_any_more_fly_on():
+    low = {'battery': 0.03, 'range': 1200.0, 'full_range': 40_000.0}
+    sky = Sky({'home': (200.0, 0.0, 0.0), **low}, {'home': (0.0, 200.0, 0.0), **low},
+              battery_reserve=0.2)
+    assert sky.step() == []
+    assert 'nobody can be stopped (u1 is low on battery, u2 is low' in (
+        sky.core.separation.texts()['u1'])
+
+
 def test_one_on_the_ground_waits_for_one_that_lands_beside_it():
     sky = Sky({'mode': 'STANDBY', 'standby': True, 'velocity': (0.0, 0.0, 0.0)},
               {'mode': 'LANDING', 'velocity': (0.0, 0.0, -1.5), 'home': (5.0, 0.0, 0.0)})

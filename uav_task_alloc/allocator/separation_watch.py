@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
-from uav_task_alloc.allocator.state.fleet import UavRecord
+from uav_task_alloc.allocator.state.fleet import UavRecord, above_reserve
 from uav_task_alloc.allocator.state.flight_pace import UavFlight
 from uav_task_alloc.allocator.state.stop_times import timed_stops
 from uav_task_alloc.allocator.state.world import World
@@ -42,6 +42,7 @@ _PERIOD = 0.5  # [s] of the published clock between two steps
 _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
 _ASK_AGAIN = 10.0  # [s] between plans for UAVs that wait for each other
+_SPARE = 60.0  # [s] at least for which a UAV that is low on battery could hold
 _PATIENCE = 10.0  # [s] for which one that waits by its list is waited for
 _MOST_SENT = 50  # lists of a UAV that are kept
 _FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
@@ -256,8 +257,11 @@ class SeparationWatch:
         if record.low or returns:
             way = self._way(record, self._way_home(self._world.list_of(uav_id), record,
                                                    flight))
-            return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
-                                f'{uav_id} is low on battery' if record.low else '', early=True)
+            if not record.low:
+                return MonitoredUav(way, (_RETURNS,), early=True)
+            spare = self._spare(record, flight, way.points[-1][0])
+            return MonitoredUav(way, (_URGENT, -spare), False, f'{uav_id} is low on battery',
+                                early=True, if_need_be=spare > _SPARE)
         points = self._list_points(self._world.list_of(uav_id), stops, flight)
         to_place, stays = () if stops else self._way_to_place(uav_id, place), ''
         if to_place:
@@ -270,6 +274,15 @@ class SeparationWatch:
         return MonitoredUav(self._way(record, points),
                             (_FLIES, -stops[0].start if stops else -math.inf),
                             bool(stops or to_place), stays=stays)
+
+    def _spare(self, record: UavRecord, flight: UavFlight, seconds_home: float) -> float:
+        """[s] for which a UAV may hold and still land with half of its reserve."""
+        metres, seconds = above_reserve(record.report, record.battery,
+                                        0.5 * self._world.params.battery_reserve)
+        if metres is None:
+            return 0.0
+        most = metres / flight.pace.speed
+        return (most if seconds is None else min(most, seconds)) - seconds_home
 
     def _way_to_place(self, uav_id: str, place: Point) -> tuple[Point, ...]:
         """The points ahead on the way to a waiting place; (): it is there, or has none."""

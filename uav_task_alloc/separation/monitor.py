@@ -42,6 +42,7 @@ class MonitoredUav:
     claim: tuple[float, ...] = ()  # of two the one with the greater claim keeps its way
     may_hold: bool = True  # it obeys a hold, and none else is in force
     why_not: str = ''  # why it may not
+    if_need_be: bool = False  # though it may not, it obeys one where nobody else can hold
     early: bool = False  # it holds as soon as a loss is predicted: later it cannot, or may not
     stays: str = ''  # why it does not move, whoever waits for it; '': it does
 
@@ -160,7 +161,8 @@ class SeparationMonitor:
         if not rule.on:
             uavs = {}
         for uav_id in [name for name in self._holds
-                       if name not in uavs or not uavs[name].may_hold]:
+                       if name not in uavs or not (
+                           uavs[name].may_hold or uavs[name].if_need_be)]:
             self._release(uav_id, uavs[uav_id].why_not if uav_id in uavs else 'it is not in '
                           'flight any more')
         predicted = FlightPredictions({name: each.way for name, each in uavs.items()}, rule,
@@ -217,14 +219,19 @@ class SeparationMonitor:
         if current is None:
             return
         lesser, greater = sorted(pair, key=lambda name: (uavs[name].claim, name))
-        for uav_id, other in ((lesser, greater), (greater, lesser)):
-            if self._may_hold(uav_id, other, uavs) and predicted.helps(uav_id, other):
+        for uav_id, other, need in ((lesser, greater, False), (greater, lesser, False),
+                                    (lesser, greater, True), (greater, lesser, True)):
+            if need and loss.begins > _ACT:
+                continue
+            if self._may_hold(uav_id, other, uavs, need) and predicted.helps(uav_id, other):
                 self._hold(uav_id, other, pair, current, predicted, uavs[other].stays)
                 return
         self._last_resort(pair, current, uavs, predicted, lesser)
 
-    def _may_hold(self, uav_id: str, other: str, uavs: Mapping[str, MonitoredUav]) -> bool:
-        return (uavs[uav_id].may_hold and uav_id not in self._holds
+    def _may_hold(self, uav_id: str, other: str, uavs: Mapping[str, MonitoredUav],
+                  need: bool) -> bool:
+        return ((uavs[uav_id].if_need_be if need else uavs[uav_id].may_hold)
+                and uav_id not in self._holds
                 and not self._waits(other, uav_id))
 
     def _waits(self, uav_id: str, for_uav: str, seen: frozenset[str] = frozenset()) -> bool:
