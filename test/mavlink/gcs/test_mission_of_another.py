@@ -13,10 +13,11 @@ from authority_bench import (
     status_is,
 )
 from flight_bench import FlightBench
-from mission_bench import make_vehicle, task_list
+from mission_bench import OURS, make_vehicle, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
+from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.two_vehicles import TwoVehicles
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.transport.codec import Codec
@@ -145,6 +146,28 @@ def test_a_mission_that_others_start_is_read_before_it_is_taken(kind):
     bench.run(limit=60.0)
     assert status_is(bench, S, 'somebody else changed the mission')
     assert bench.completed() == []
+
+
+@ARDUPILOT
+@pytest.mark.parametrize('shared', [True, False])
+def test_a_mission_replaced_in_our_hold_is_not_reported_as_flown(kind, shared):
+    bench = flying(kind, 'ABCDE')
+    bench.run(limit=2.0)
+    bench.ground_station.hold('uav_1', HoldRequest('operator', True, 'look'), bench.now)
+    assert bench.run(lambda: bench.executor().watch.mode == MODES[kind].hold, 10.0)
+    bench.run(limit=5.0)
+    down = bench._down
+    if not shared:  # the other station has a link of its own
+        bench._down = lambda n, messages: down(
+            n, [m for m in messages if getattr(m, 'target_system', OURS[0]) in (0, OURS[0])])
+    shifted(bench, 400.0, 0.0)
+    bench.run(limit=2.0)
+    bench.ground_station.hold('uav_1', HoldRequest('operator', False), bench.now)
+    assert bench.run(lambda: bench.onboard().state is MissionState.FOREIGN, 40.0)
+    assert shared is (bench.executor().watch.mode == MODES[kind].hold)
+    bench.run(limit=40.0)
+    assert bench.completed() == []
+    assert status_is(bench, S, 'somebody else changed the mission')
 
 
 # tasks of others at the same place

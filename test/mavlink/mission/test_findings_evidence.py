@@ -242,12 +242,13 @@ def test_where_it_comes_to_rest_when_it_is_held_for_an_upload_is_no_evidence():
     assert bench.completed() == []
 
 
-@pytest.mark.parametrize(('frame', 'completed'), [(0, []), (1, ['B'])])
-def test_a_reached_sent_after_the_mission_was_taken_needs_no_position(frame, completed):
+@pytest.mark.parametrize(('frame', 'place', 'completed'), [
+    (0, 50.0, []), (1, 50.0, ['B']), (1, 600.0, [])])
+def test_a_reached_sent_after_the_mission_was_taken_has_to_be_possible(frame, place, completed):
     flight = Flight(repeats=False)
     flight.begin(A=100.0)
     taken = flight.frames.note(9, flight.now)
-    flight.begin(B=600.0)
+    flight.begin(B=place)
     flight.table.note_reached(0, flight.now, frame=taken + frame)
     flight.stay(10.0)
     assert list(flight.table.completed) == completed

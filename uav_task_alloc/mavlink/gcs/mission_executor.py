@@ -85,7 +85,7 @@ class MissionExecutor:
         self._end_actions, log = EndActions(peer, profile, self.onboard), StatusTextLog()
         self._was_stale, self._restarts = False, 0
         self._messages = MissionMessages(self.onboard, self.telemetry, self.watch, self.sender,
-                                         profile.atomic, log, self.notes)
+                                         profile.atomic, log, self.notes, peer)
         self.fence = VehicleFence(peer, profile, origin, self.telemetry, self.onboard,
                                  self.authority, lambda: self.policy, rng,
                                  fence_memory or FenceMemory())

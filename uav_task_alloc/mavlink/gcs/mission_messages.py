@@ -12,6 +12,7 @@ from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
+from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
@@ -29,11 +30,13 @@ class MissionMessages:
         atomic: whether a vehicle takes a mission as a whole (PX4).
         log: of status texts.
         notes: for the log, emptied by the caller.
+        peer: the vehicle.
     """
 
     def __init__(self, onboard: OnboardMission, telemetry: Telemetry, watch: AuthorityWatch,
                  sender: CommandSender, atomic: bool, log: StatusTextLog,
-                 notes: deque[OperatorNote]) -> None:
+                 notes: deque[OperatorNote], peer: Peer) -> None:
+        self._peer, self._doubted = peer, False  # the mission: another may have changed it
         self._onboard, self._telemetry, self._watch = onboard, telemetry, watch
         self._sender, self._atomic = sender, atomic
         self._status_text_log, self._notes = log, notes
@@ -77,6 +80,10 @@ class MissionMessages:
                     self._sender.busy or self._onboard.open):
                 self._onboard.mission.note_changed(now)
             self._notes += filter(None, (self._status_text_log.receive(message, now),))
+        self._doubted = (self._doubted or self._peer.changed_by_another(message)
+                         or progress.take_contradicted())
+        if self._doubted and not (self._sender.busy or self._onboard.open):
+            self._doubted = not self._onboard.mission.note_changed(now)
 
     def _position(self, message: Message, newest: bool, now: float) -> None:
         if self._telemetry.has_position:

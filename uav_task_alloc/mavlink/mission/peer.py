@@ -29,6 +29,7 @@ class Peer:
     our_system: int = 245  # id of the ground station
     our_component: int = dialect.MAV_COMP_ID_MISSIONPLANNER  # id of the ground station
     mission_type: int = dialect.MAV_MISSION_TYPE_MISSION  # MAV_MISSION_TYPE
+
     def is_from_vehicle(self, message: Message) -> bool:
         """Whether a message is sent by this vehicle to us or to all, of our mission type."""
         return (message.get_srcSystem() == self.system
@@ -36,6 +37,13 @@ class Peer:
                 and getattr(message, 'target_system', 0) in (0, self.our_system)
                 and getattr(message, 'target_component', 0) in (0, self.our_component)
                 and getattr(message, 'mission_type', self.mission_type) == self.mission_type)
+
+    def changed_by_another(self, message: Message) -> bool:
+        """Whether a MISSION_ACK ends a transfer that another station began on a shared link."""
+        return (message.get_type() == 'MISSION_ACK' and message.mission_type == self.mission_type
+                and message.type != dialect.MAV_MISSION_DENIED
+                and not (message.target_system in (0, self.our_system)
+                         and message.target_component in (0, self.our_component)))
 
     def count(self, count: int) -> Message:
         """MISSION_COUNT: begin an upload of so many items."""

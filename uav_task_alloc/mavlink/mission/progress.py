@@ -293,6 +293,11 @@ class ProgressTable:
         self.end_before_restart.note_reached(seq, now)
         self._reached.note(seq, now, proven, frame)
 
+    def take_contradicted(self) -> bool:
+        """Whether a REACHED has named an item far from the vehicle; True once."""
+        contradicted, self._reached.contradicted = self._reached.contradicted, False
+        return contradicted
+
     def reached_first_at(self, seq: int, now: float, frame: int) -> float:
         """When [s] the first REACHED was received that this one may repeat, of any epoch.
 

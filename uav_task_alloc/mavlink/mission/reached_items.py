@@ -35,6 +35,7 @@ class ReachedItems:
         self.seqs: set[int] = set()  # reached in this epoch
         self.last: int | None = None  # the last one of this epoch
         self.end_at = -math.inf  # [s] REACHED of the last item was received
+        self.contradicted = False  # one named an item far away: another mission may be on board
 
     def begin(self) -> None:
         """Begin an epoch."""
@@ -54,16 +55,27 @@ class ReachedItems:
     def note(self, seq: int, now: float, proven: bool, frame: int | None) -> None:
         """Take one; see `ProgressTable.note_reached`."""
         epoch, epochs, positions = self._epoch, self._epochs, self._positions
-        proven = proven or (
-            frame is not None and not self._repeats and frame > epoch.taken_frame)
+        possible = 0 <= seq < len(epoch.items) and positions.can_have_reached(
+            epoch.items[seq], now)
+        contradicts = False
+        if not proven and frame is not None and not self._repeats and frame > epoch.taken_frame:
+            proven = possible or self._was_lately_at(seq, now)
+            contradicts = not proven and bool(epoch.items)
         reached = epochs.series.add(seq, now, frame)
-        if (proven or now >= epochs.before.until) and epoch.items:
-            if 0 <= seq < len(epoch.items) and (
-                    proven or positions.can_have_reached(epoch.items[seq], now)):
+        if contradicts:
+            self.contradicted = True
+        elif (proven or now >= epochs.before.until) and epoch.items:
+            if 0 <= seq < len(epoch.items) and (proven or possible):
                 self._accept(reached, now)
         elif not self._prove(reached, now):
             # a position that shows it may still arrive
             epochs.unproven[seq] = now + MAX_MESSAGE_DELAY, reached
+
+    def _was_lately_at(self, seq: int, now: float) -> bool:
+        """Whether it was at an item when a late message of now may have been sent."""
+        epoch, positions = self._epoch, self._positions
+        return 0 <= seq < len(epoch.items) and positions.was_at(
+            epoch.items[seq], positions.recent(epoch.since, now))
 
     def note_end(self, seq: int, now: float) -> None:
         """Take one of this epoch or the next: the mission may have ended."""

@@ -113,10 +113,15 @@ class VerifiedMission:
         """Note that another station has put the mission on board."""
         self.is_foreign, self.state = True, MissionState.FOREIGN
 
-    def note_changed(self, now: float) -> None:
-        """Request a download, as the vehicle reports a change that is not of our upload."""
+    def note_changed(self, now: float) -> bool:
+        """Request a download, as the vehicle reports a change that is not of our upload.
+
+        Returns:
+            Whether it is requested: not while the change may still be of our upload.
+        """
         if now - self.verified_at >= SETTLE_TIME:
             self.items = None
+        return self.items is None
 
     def read_since(self, since: float) -> bool:
         """Whether it was read at steady time `since` [s] or later; else request a download."""
