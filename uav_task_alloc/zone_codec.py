@@ -132,6 +132,21 @@ def decode_zone_array(msg: Any) -> tuple[list[ThreatZone], dict[str, str]]:
     return list(valid.values()), invalid
 
 
+def refused_text(invalid: Mapping[str, str]) -> str:
+    """Return a warning about the zones of a message that are refused.
+
+    Args:
+        invalid: why, by id.
+
+    Returns:
+        The first reason and how many more there are, on one line; '' where none is refused.
+    """
+    if not invalid:
+        return ''
+    more = f' (and {len(invalid) - 1} more)' if len(invalid) > 1 else ''
+    return f'threat_zones refused: {next(iter(invalid.values()))}{more}'
+
+
 def _shape_of(place: str, value: object) -> Shape:
     for shape in Shape:
         if value in (shape, shape.value, shape.name, shape.name.lower()):

@@ -280,6 +280,8 @@ def test_a_bad_zone_is_refused_with_one_warning(sky, probe):
     for _ in range(3):
         zones.publish(array)
     world.until(lambda: 'threat_zones: zone z: radius = -1.0' in world.bridge.output())
+    world.until(lambda: any(status.message.startswith('refused: zone z: radius = -1.0')
+                            for array in world.health for status in array.status))
     world.send(1, 1, [0])
     world.until(lambda: world.completed(1) == ['u1_0'])
     assert world.bridge.output().count('radius = -1.0') == 1

@@ -53,7 +53,7 @@ from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.record.message_records import from_stamp
-from uav_task_alloc.zone_codec import decode_zone_array
+from uav_task_alloc.zone_codec import decode_zone_array, refused_text
 
 _STEP_PERIOD = 0.025  # [s]
 _LOCK_TIMEOUT = 5.0  # [s] for the journal of an allocator that is exiting
@@ -112,6 +112,7 @@ class AllocatorNode(Node):
         self.subscribers_by = time.monotonic() + _SUBSCRIBER_TIMEOUT
         watch_clock(self, self.get_logger().warning)
         self.offsets = ClockOffsets('reports')
+        self.refused_zones = ''  # of the last message
         self.worker = Worker(self.load_solver, self.solve, self.deliver, self.on_solver_error)
         self.worker.start()
 
@@ -189,7 +190,9 @@ class AllocatorNode(Node):
         try:
             zones, invalid = decode_zone_array(msg)
         except InvalidValue as error:
+            self.refused_zones = f'threat_zones refused: {error}'
             return self.refusals.report('threat_zones', '', str(error))
+        self.refused_zones = refused_text(invalid)
         self.refusals.report('threat_zones', '', '')
         for zone in msg.zones:
             self.refusals.report('threat_zones', zone.zone_id, invalid.get(zone.zone_id, ''))
@@ -356,7 +359,7 @@ class AllocatorNode(Node):
             self.get_logger().error(stopped if conflict else 'fleet_origin: all agree')
         warnings = health_warnings(self.world, self.persistence.error, self.solver_error,
                                    self.stamp())
-        warnings += filter(None, [self.offsets.warning(time.monotonic())])
+        warnings += filter(None, [self.offsets.warning(time.monotonic()), self.refused_zones])
         self.diagnostics.publish(from_diagnostics([allocator_row(
             self.get_fully_qualified_name(), [stopped] if stopped else warnings,
             {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts(),

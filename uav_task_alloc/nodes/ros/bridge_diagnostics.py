@@ -94,6 +94,8 @@ class BridgeDiagnostics:
         self._log.report_trouble('fleet_origin', refusal)
         if refusal:
             yield self._row('fleet_origin', _ERROR, refusal)
+        if refused := self._log.refusal('threat_zones'):
+            yield self._row('threat_zones', _WARN, f'refused: {refused}')
         for link in self._connections.links:
             self._log.report_trouble(link.name, link.trouble)
             yield self._row(link.name, _ERROR if link.trouble else _OK, link.trouble or 'open')

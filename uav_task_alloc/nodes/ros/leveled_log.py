@@ -57,6 +57,17 @@ class LeveledLog:
         if self._is_new(topic, reason) and reason:
             self.write('warning', f'{topic}: {reason}: ignored')
 
+    def refusal(self, topic: str) -> str:
+        """Return why the last message of a topic was refused.
+
+        Args:
+            topic: its name, as reported.
+
+        Returns:
+            '' where it was valid, or none has come.
+        """
+        return self._troubles.get(topic, '')
+
     def _is_new(self, name: str, text: str) -> bool:
         new = text != self._troubles.get(name, '')
         self._troubles[name] = text
