@@ -148,8 +148,11 @@ def _uav_warnings(world: World, stamp: float | None) -> list[str]:
     silent = [uav_id for uav_id, record in records
               if record.silent and not flights.in_battery_change(uav_id, stamp)]
     low = [uav_id for uav_id, record in records if record.low]
+    doubled = [uav_id for uav_id, record in records if record.in_two_places and not record.silent]
     return [f'{text}: {first_of(uavs, _MAX_NAMED)}'
-            for text, uavs in (('silent', silent), ('battery low', low)) if uavs]
+            for text, uavs in (('silent', silent), ('battery low', low),
+                               ('reported from two places in turn, expected one source each',
+                                doubled)) if uavs]
 
 
 def _zone_warnings(world: World) -> list[tuple[str, str]]:

@@ -272,6 +272,20 @@ def test_a_position_that_jumps_is_logged_once_and_planned_for():
     assert [stop.leg.length for stop in driver.world.lists.get('a').stops] == [100.0]
 
 
+def test_a_uav_that_two_sources_report_is_a_warning_while_they_do():
+    driver, text = AllocatorDriver(position_jump=200.0), 'reported from two places in turn, '
+    driver.uav('a', 0.0, 0.0, 50.0)
+    for k in range(6):
+        driver.now += 0.1
+        driver.uav('a', 5000.0 * (k % 2 == 0), 0.0, 50.0)
+        driver.uav('b', 5000.0 * (k > 2), 0.0, 50.0)  # jumps once
+    assert health_warnings(driver.world, '') == [f'{text}expected one source each: a']
+    for _ in range(3):  # one source has ended
+        driver.now += 1.0
+        driver.uav('a', 0.0, 0.0, 50.0)
+    assert health_warnings(driver.world, '') == []
+
+
 def test_flight_and_silence_are_no_jumps():
     driver = AllocatorDriver(position_jump=200.0)
     driver.uav('a', 0.0, 0.0, 50.0, cruise_speed=20.0)

@@ -13,6 +13,7 @@ from uav_task_alloc.model import Point, Task, Uav
 from uav_task_alloc.params import AllocatorParams
 
 _FASTEST = 10.0  # times the cruise speed: faster is a jump, in accelerated simulations too
+_JUMPS_APART, _SEVERAL_JUMPS = 2.0, 4  # [s] at most, and how many then show two sources
 _MAX_NAMED = 5  # UAVs in a reason
 LEAST_ENDURANCE = 1.0  # [s] of a UAV that has none left
 _RECHARGED = 0.1  # [0..1] above the reserve: a battery that was low is good again
@@ -36,11 +37,17 @@ class UavRecord:
     # was not sent, or has it
     change_from: float | None = None
     jumped: float = -math.inf  # [s] steady clock: the position last jumped
+    jumps: int = 0  # of the position, shortly after one another
 
     @property
     def inside_zone(self) -> bool:
         """Whether it is inside a zone."""
         return bool(self.zone)
+
+    @property
+    def in_two_places(self) -> bool:
+        """Whether its position keeps jumping: two sources report under its id."""
+        return self.jumps >= _SEVERAL_JUMPS
 
     @property
     def ready(self) -> bool:
@@ -110,7 +117,8 @@ class Fleet:
         if before:
             self.records[uav_id] = replace(
                 self.records[uav_id], zone=before.zone, home_zone=before.home_zone,
-                blocked_on_ground=before.blocked_on_ground, jumped=before.jumped)
+                blocked_on_ground=before.blocked_on_ground, jumped=before.jumped,
+                jumps=before.jumps if now - before.jumped <= _JUMPS_APART else 0)
         if battery is not None and battery >= self.change_from.get(uav_id, math.inf):
             self.end_change(uav_id)
         return before
@@ -159,7 +167,8 @@ class Fleet:
 
     def set_jumped(self, uav_id: str, now: float) -> None:
         """Record that the position jumped."""
-        self.records[uav_id] = replace(self.records[uav_id], jumped=now)
+        record = self.records[uav_id]
+        self.records[uav_id] = replace(record, jumped=now, jumps=record.jumps + 1)
 
     def set_zone(self, uav_id: str, zone: str, home_zone: str, blocked_on_ground: str) -> None:
         """Record the zones that a UAV and its home are inside, and why it gets no tasks."""
