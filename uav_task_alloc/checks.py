@@ -138,7 +138,8 @@ def check_ros_name(place: str, value: str) -> str:
         InvalidValue: it is no ROS name, see `is_ros_name`.
     """
     if not is_ros_name(value):
-        raise InvalidValue(place, value, 'a ROS name (letters, digits, _ and /; no digit first)')
+        raise InvalidValue(place, value, 'a ROS name (letters, digits, single _ and /; no digit '
+                                         'first; at most 200 characters)')
     return value
 
 

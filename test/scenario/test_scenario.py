@@ -131,6 +131,8 @@ REFUSED = {
     UAV + 'uavs: 1\n':
         ":3: scenario: key 'uavs' is given twice: expected it once; first in line 1",
     UAV.replace('id: u1, ', ''): ':2: scenario.uavs[0].id is missing: expected letters',
+    UAV.replace('u1', 'u__1'): ':2: scenario.uavs[0].id = u__1: expected letters, digits and s',
+    UAV.replace('u1', 'u' * 201): f':2: scenario.uavs[0].id = {"u" * 40}: expected letters',
     UAV + 'tasks:\n  - {id: a b, position: [1, 1, 1]}\n':
         ':4: scenario.tasks[0].id = a b: expected letters',
     UAV.replace('[0, 0, 0]', '&a [0, 0, *a]'): ':2: a value contains itself',

@@ -35,9 +35,10 @@ POSITIVE = number_value(0.0, open_low=True)
 POINT = list_of(COORDINATE, 'three numbers [x, y, z]', 3, 3)
 CORNER = list_of(COORDINATE, 'two numbers [x, y]', 2, 2)
 NAME = text_value('a non-empty string')
-ID = text_value('letters, digits, _ and / after a letter or _', is_ros_name)
-ROS_NAME = text_value('letters, digits and _ after a letter, as it names topics',
-                re.compile(r'[A-Za-z][A-Za-z0-9_]*').fullmatch)
+ID = text_value('letters, digits, single _ and / after a letter or _, at most 200', is_ros_name)
+ROS_NAME = text_value(
+    'letters, digits and single _ after a letter, at most 200, as it names topics',
+    lambda text: is_ros_name(text) and re.fullmatch(r'[A-Za-z]\w*', text))
 NAMES = list_of(NAME, 'a list of names')
 
 ORIGIN: KeyTable = {
