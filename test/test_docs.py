@@ -206,6 +206,13 @@ def test_every_error_quoted_in_the_faq_is_in_the_sources():
             assert piece.strip() in ours, f'{error}: {piece!r} is in no source'
 
 
+@pytest.mark.parametrize('word', [
+    'piece', 'strip', 'separation', 'separation alert', 'fence', 'fence area', 'rally point',
+    'relaunch', 'capability', 'acceptance radius', 'battery reserve', 'turn home'])
+def test_a_word_of_messages_and_diagnostics_is_in_the_glossary(word):
+    assert f'\n| {word} |' in (ROOT / 'docs/glossary.md').read_text()
+
+
 def test_the_numbers_in_the_readme_are_those_of_the_demo():
     demo = scenario.load(ROOT / 'config/scenarios/demo.yaml')
     text = (ROOT / 'README.md').read_text()
