@@ -7,6 +7,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from test_allocator import Fleet, begin
 from uav_task_alloc_msgs import msg as m
 
+from uav_task_alloc.nodes.conversions.messages import LATCHED
+
 pytestmark = pytest.mark.ros
 
 
@@ -26,3 +28,13 @@ def test_a_refused_zone_is_a_warning_until_the_next_valid_message(start, probe):
     probe.until(lambda: 'threat_zones refused: zones: number = 1001' in latest().message)
     fleet.zones.publish(m.ThreatZoneArray(zones=[good]))
     probe.until(lambda: latest().level == DiagnosticStatus.OK)
+
+
+def test_two_publishers_of_zones_are_a_warning(start, probe):
+    health, fleet = probe.collect(DiagnosticArray, '/diagnostics', 10), Fleet(probe)
+    begin(start, fleet)
+    probe.until(lambda: health and health[-1].status[0].level == DiagnosticStatus.OK)
+    second = probe.publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    probe.until(lambda: 'threat_zones has 2 publishers' in health[-1].status[0].message)
+    probe.node.destroy_publisher(second)
+    probe.until(lambda: health[-1].status[0].level == DiagnosticStatus.OK)

@@ -360,6 +360,9 @@ class AllocatorNode(Node):
         warnings = health_warnings(self.world, self.persistence.error, self.solver_error,
                                    self.stamp())
         warnings += filter(None, [self.offsets.warning(time.monotonic()), self.refused_zones])
+        sources = self.count_publishers('threat_zones')
+        warnings += [f'threat_zones has {sources} publishers: expected one, as each message '
+                     'replaces all zones'] if sources > 1 else []
         self.diagnostics.publish(from_diagnostics([allocator_row(
             self.get_fully_qualified_name(), [stopped] if stopped else warnings,
             {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts(),
