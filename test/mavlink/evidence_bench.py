@@ -15,10 +15,10 @@ SPEED = 10.0  # [m/s]
 class Flight:
     """A progress table, fed with positions at 5 Hz along x, 50 m high; 20 frames a second."""
 
-    def __init__(self, repeats=True):
+    def __init__(self, repeats=True, plane=False):
         self.frames, self.now, self.x = FrameLog(), 0.0, 0.0
         self.lost = False  # positions
-        self.table = ProgressTable(self.frames, repeats=repeats)
+        self.table = ProgressTable(self.frames, repeats=repeats, plane=plane)
         self.stay(0.0)
 
     def stay(self, seconds, speed=0.0):

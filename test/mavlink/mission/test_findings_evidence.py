@@ -242,10 +242,13 @@ def test_where_it_comes_to_rest_when_it_is_held_for_an_upload_is_no_evidence():
     assert bench.completed() == []
 
 
-@pytest.mark.parametrize(('frame', 'place', 'completed'), [
-    (0, 50.0, []), (1, 50.0, ['B']), (1, 600.0, [])])
-def test_a_reached_sent_after_the_mission_was_taken_has_to_be_possible(frame, place, completed):
-    flight = Flight(repeats=False)
+@pytest.mark.parametrize(('frame', 'place', 'plane', 'completed'), [
+    (0, 50.0, False, []), (1, 50.0, False, ['B']), (1, 200.0, False, []),
+    (1, 200.0, True, ['B']), (1, 600.0, True, [])])
+def test_a_reached_sent_after_the_mission_was_taken_has_to_be_possible(
+        frame, place, plane, completed):
+    """A plane may pass a corner 300 m wide of it."""
+    flight = Flight(repeats=False, plane=plane)
     flight.begin(A=100.0)
     taken = flight.frames.note(9, flight.now)
     flight.begin(B=place)

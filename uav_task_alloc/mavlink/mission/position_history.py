@@ -16,7 +16,7 @@ from uav_task_alloc.mavlink.mission.flown_path import (
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.model import Point
 
-_REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
+REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
 _FRESH = 3.0  # [s] for which a position is the present one
 _JUMP_RECOVERY = 60.0  # [s] of the vehicle, after a jump of its estimate; a second one ends it
 _SETTLING = 10.0  # [s] after a jump on the ground, in which it may jump once more in flight
@@ -192,12 +192,18 @@ class PositionHistory:
             self._settling_until = self._doubt[0] + _SETTLING
             self._doubt = self._doubt[0], -math.inf
 
-    def can_have_reached(self, item: Item, now: float) -> bool:
-        """Whether the newest position allows that an item was reached, or is not usable."""
+    def can_have_reached(self, item: Item, now: float, reach: float = REACH) -> bool:
+        """Whether the newest position allows that an item was reached, or is not usable.
+
+        Args:
+            item: of a mission.
+            now: steady time [s].
+            reach: [m] beyond its radius.
+        """
         if self.place is None or now - self.place[1] > _FRESH or self.invalid(now):
             return True
         distance = self.distance(item)
-        return math.isinf(distance) or distance <= item.radius + _REACH
+        return math.isinf(distance) or distance <= item.radius + reach
 
     def distance(self, item: Item) -> float:
         """Return the distance from an item to the newest position.

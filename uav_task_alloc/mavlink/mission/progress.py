@@ -72,7 +72,8 @@ class ProgressTable:
             self._epoch, self._tasks, self.positions, self._epochs, self._frames)
         self._mode = self._moves.mode
         self._reached = ReachedItems(
-            self._epoch, self._tasks, self.positions, self._epochs, self._moves, repeats)
+            self._epoch, self._tasks, self.positions, self._epochs, self._moves, repeats,
+            plane)
         self.end_before_restart = EndBeforeRestart(
             self._epoch, self._tasks, self.positions, self._moves)
         self.path, self.previous_returned = self.positions.path, self._epochs.has_returned

@@ -11,9 +11,15 @@ import math
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.current_item import CurrentItem
 from uav_task_alloc.mavlink.mission.epoch import Epoch
-from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
+from uav_task_alloc.mavlink.mission.position_history import (
+    MAX_MESSAGE_DELAY,
+    REACH,
+    PositionHistory,
+)
 from uav_task_alloc.mavlink.mission.reached_epoch import CurrentEpoch, ReachedEpoch
 from uav_task_alloc.mavlink.mission.reached_series import ReachedReport
+
+_REACH_PLANE = 300.0  # [m] as REACH: it may pass a corner that wide of it
 
 
 class ReachedItems:
@@ -26,12 +32,14 @@ class ReachedItems:
         epochs: to which a REACHED can belong.
         moves: the current item of `epoch`.
         repeats: whether the autopilot repeats REACHED (PX4).
+        plane: whether the vehicle turns as wide as a plane.
     """
 
     def __init__(self, epoch: Epoch, tasks: CompletedTasks, positions: PositionHistory,
-                 epochs: ReachedEpoch, moves: CurrentItem, repeats: bool) -> None:
+                 epochs: ReachedEpoch, moves: CurrentItem, repeats: bool, plane: bool) -> None:
         self._epoch, self._tasks, self._positions = epoch, tasks, positions
         self._epochs, self._moves, self._repeats = epochs, moves, repeats
+        self._reach = _REACH_PLANE if plane else REACH
         self.seqs: set[int] = set()  # reached in this epoch
         self.last: int | None = None  # the last one of this epoch
         self.end_at = -math.inf  # [s] REACHED of the last item was received
@@ -59,7 +67,7 @@ class ReachedItems:
             epoch.items[seq], now)
         contradicts = False
         if not proven and frame is not None and not self._repeats and frame > epoch.taken_frame:
-            proven = possible or self._was_lately_at(seq, now)
+            proven = self._is_near(seq, now)
             contradicts = not proven and bool(epoch.items)
         reached = epochs.series.add(seq, now, frame)
         if contradicts:
@@ -71,11 +79,14 @@ class ReachedItems:
             # a position that shows it may still arrive
             epochs.unproven[seq] = now + MAX_MESSAGE_DELAY, reached
 
-    def _was_lately_at(self, seq: int, now: float) -> bool:
-        """Whether it was at an item when a late message of now may have been sent."""
+    def _is_near(self, seq: int, now: float) -> bool:
+        """Whether it may be at an item, or was when a late message of now may have been sent."""
         epoch, positions = self._epoch, self._positions
-        return 0 <= seq < len(epoch.items) and positions.was_at(
-            epoch.items[seq], positions.recent(epoch.since, now))
+        if not 0 <= seq < len(epoch.items):
+            return False
+        item = epoch.items[seq]
+        return positions.can_have_reached(item, now, self._reach) or positions.was_at(
+            item, positions.recent(epoch.since, now))
 
     def note_end(self, seq: int, now: float) -> None:
         """Take one of this epoch or the next: the mission may have ended."""
