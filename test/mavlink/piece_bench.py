@@ -11,6 +11,7 @@ from uav_task_alloc.geometry.frames import to_enu
 from uav_task_alloc.geometry.polyline import polyline_length, segment_distance
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
+from uav_task_alloc.sim.config import FlightMode
 
 TRIGGER = Action('trigger', {'distance': 20.0})
 HEIGHT = 40.0  # [m]
@@ -119,3 +120,17 @@ def halfway(bench, task, metres=100.0):
     body = bench.vehicles[1].flight.body
     assert bench.run(lambda: math.dist(body.position[1:], task.path[0][1:]) < 2.0
                      and body.position[0] >= metres, 200.0)
+
+
+def flown_in_mission(bench, n=1):
+    """The positions of a vehicle in mission mode from now on, in a list that grows."""
+    vehicle, found = bench.vehicles[n], []
+    step = vehicle.step
+
+    def stepped(now):
+        out = step(now)
+        if vehicle.flight.mode is FlightMode.MISSION:
+            found.append(vehicle.flight.body.position)
+        return out
+    vehicle.step = stepped
+    return found

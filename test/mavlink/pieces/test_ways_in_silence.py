@@ -3,12 +3,20 @@
 import math
 
 import pytest
-from piece_bench import halfway, list_of, piece, places, strip, surveying
+from piece_bench import (
+    flown_in_mission,
+    halfway,
+    list_of,
+    piece,
+    places,
+    strip,
+    surveying,
+)
 
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
-from uav_task_alloc.sim.config import FlightMode
 
 RETURN = {'ardupilot': 6, 'px4': 0x05040000}
+HOLD = {'ardupilot': 5, 'px4': 0x03040000}
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 
@@ -116,17 +124,9 @@ def test_a_strip_is_completed_where_the_vehicle_is_lost_at_its_end(kind, flown):
 @BOTH
 @pytest.mark.parametrize('lost', [True, False])
 def test_what_follows_a_way_in_another_mode_is_flown_again(kind, lost):
-    task, in_mission = strip(0, length=300.0), []
+    task = strip(0, length=300.0)
     bench, _ = surveying(kind, list_of(task), tick=0.05)
-    vehicle, shown = bench.vehicles[1], [False]
-    step = vehicle.step
-
-    def stepped(now):
-        out = step(now)
-        if vehicle.flight.mode is FlightMode.MISSION:
-            in_mission.append(vehicle.flight.body.position)
-        return out
-    vehicle.step = stepped
+    vehicle, shown, in_mission = bench.vehicles[1], [False], flown_in_mission(bench)
     halfway(bench, task, 100.0)
     if lost:
         bench.line.tampers.append(lambda direction, m, now: [] if (
@@ -139,3 +139,22 @@ def test_what_follows_a_way_in_another_mode_is_flown_again(kind, lost):
     assert bench.hand_over() == ''
     assert bench.run(lambda: bench.completed() == ['F#0'], 300.0)
     assert all(min(math.dist(place, p) for p in in_mission) < 10.0 for place in places(task, 5.0))
+
+
+@BOTH
+def test_a_restarted_bridge_counts_nothing_that_follows_a_way_in_another_mode(kind):
+    task = strip(0, length=300.0)
+    bench, _ = surveying(kind, list_of(task))
+    body, in_mission = bench.vehicles[1].flight.body, flown_in_mission(bench)
+    halfway(bench, task, 100.0)
+    bench.vehicles[1].rc_mode(HOLD[kind])
+    bench.start()
+    bench.run(lambda: len(bench.ground_station.sessions) == 1, 30.0)
+    bench.assign(list_of(task, revision=2))
+    for _ in range(12):  # carried along the strip by hand, 5 m a second
+        bench.run(limit=1.0)
+        x, y, z = body.position
+        body.position = (x + 5.0, y, z)
+    assert bench.hand_over() == ''
+    assert bench.run(lambda: bench.completed() == ['F#0'], 300.0)
+    assert all(min(math.dist(place, p) for p in in_mission) < 12.0 for place in places(task, 5.0))

@@ -193,8 +193,11 @@ class MissionExecutor:
         heartbeat = newest and message.get_type() == 'HEARTBEAT'
         if heartbeat:
             self.watch.receive_heartbeat(message, now)
+            progress = self.onboard.progress
             if mode_before is ModeFunction.MISSION and not self.telemetry.in_mission:
-                self.onboard.progress.note_mission_left(now)
+                progress.note_mission_left(now)
+            if not self.telemetry.in_mission:
+                progress.coverage.note_other_mode(progress.path.newest)
         if not self.telemetry.in_mission:
             self.onboard.progress.note_other_mode(now)  # as COMMAND_ACK shows
         elif heartbeat or self.telemetry.shows_mission:

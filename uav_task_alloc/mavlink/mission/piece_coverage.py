@@ -55,6 +55,7 @@ class PieceCoverage:
         self._ending: str | None = None  # passed in flight; it is not known how far it was flown
         self._sampled = -math.inf  # vehicle time [s] of the newest position
         self._restored: set[str] = set()  # under way when the previous run of the bridge ended
+        self._restored_until = math.inf  # vehicle time [s]: another mode was shown in this run
         self.recorded = False  # what was flown before this run is known by its file
         self._recent: deque[PositionSample] = deque(maxlen=_RECENT)  # in mission mode, without gap
         self._unseen_since: PositionSample | None = None  # the last one before a gap before these
@@ -242,6 +243,25 @@ class PieceCoverage:
             if piece is not None and not piece.gone:
                 self._follow(piece, sample, before)
                 piece.missed = piece.off is not None
+        if sample.t > self._restored_until:
+            self._leave_restored()
+
+    def note_other_mode(self, newest: float) -> None:
+        """Note that a heartbeat shows another mode than that of missions.
+
+        Ways that were under way when the previous run ended are followed up to the next position,
+        which shows how far they were flown in between.
+
+        Args:
+            newest: vehicle time [s] of the newest position.
+        """
+        self._restored_until = min(self._restored_until, newest)
+
+    def _leave_restored(self) -> None:
+        """Fly the rest of the ways that were under way when the previous run ended."""
+        for name in self._restored - {self._under_way, self._ending}:
+            self._leave(name)
+        self._restored.clear()
 
     def _forget_recent(self) -> None:
         self._recent.clear()
@@ -336,16 +356,22 @@ class PieceCoverage:
             piece.flown = mark.flown
             self._partly[mark.task] = None
             piece.missed = mark.state == PART_MISSED
+            ended = False
             if mark.state == PART_UNDER_WAY:
                 self._restored.add(mark.task)
             if mark.state == PART_UNDER_WAY and samples:
                 self._continue(piece, samples[0])
                 for before, sample in pairwise(samples):
-                    piece.follow(sample, before.t, fastest, self.corridor, self.mission_known)
+                    if not ended:
+                        piece.follow(sample, before.t, fastest, self.corridor,
+                                     self.mission_known)
+                    ended = ended or sample.t > self._restored_until
                 self._sampled = max(self._sampled, samples[-1].t)
             if piece.reversed != stop.reversed:
                 self._turn(piece, stop.task.path, stop.reversed)
             self.version += 1
+        if samples and samples[-1].t > self._restored_until:
+            self._leave_restored()
 
     def _continue(self, piece: Piece, sample: PositionSample) -> None:
         if piece.continue_at(sample, self.corridor):
