@@ -46,6 +46,12 @@ class ReportedStatus:
     pieces: int = 0  # of work; 0: it has none
 
 
+# of one that is in no message any more, though it has not ended
+UNKNOWN_TASK = ReportedStatus(
+    'PENDING', '', 'the allocator does not know it any more, as after a restart without a '
+    'journal; announce it again')
+
+
 @dataclass(frozen=True, slots=True)
 class SolveRecord:
     """One published plan: when, solve time, and what triggered it."""

@@ -22,6 +22,7 @@ from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lis
 from uav_task_alloc.record.record_file import RECORD_FILE, Line, read_lines
 from uav_task_alloc.record.reported import (
     END_STATES,
+    UNKNOWN_TASK,
     AnnouncedTask,
     ReportedAuthority,
     ReportedStatus,
@@ -196,8 +197,9 @@ class RunState:
         rows = {row['task']: ReportedStatus(row['state'], row['uav'], row['reason'],
                                             row.get('done', 0), row.get('pieces', 0))
                 for row in line['statuses']}
-        self.ended.update((task, row) for task, row in self.statuses.items()
-                          if row.state in END_STATES)
+        self.ended.update((task, row if row.state in END_STATES else UNKNOWN_TASK)
+                          for task, row in self.statuses.items()
+                          if row.state in END_STATES or task not in rows)
         for task in rows.keys() & self.ended.keys():
             del self.ended[task]
         self.pieces = {task: row for task, row in rows.items() if split_piece(task)[1]}
