@@ -235,6 +235,14 @@ def test_a_run_is_over_when_all_tasks_are_final_and_the_uavs_are_at_rest():
     assert run_is_over(run_state(*DONE), TWO, clock=9.0)
 
 
+@pytest.mark.parametrize(('waits', 'over'), [([[9.0, 9.0, 50.0]], True), ([], False)])
+def test_a_run_is_over_where_a_uav_stands_at_its_waiting_place(waits, over):
+    waiting = 'list', {'uav': 'u1', 'revision': 2, 'tasks': [], 'end': 0, 'distance': 0.0,
+                       'stamp': 3.0, 'waits': waits}
+    run = run_state(*DONE, waiting, state(mode='ON_MISSION', revision=2))
+    assert run_is_over(run, TWO, clock=9.0) is over
+
+
 @pytest.mark.parametrize('more', [
     state(mode='RETURNING'), state(speed=3.0),
     status(('a', 'COMPLETED'), ('b', 'ACTIVE')), status(('a', 'COMPLETED'))])

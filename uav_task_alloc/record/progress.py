@@ -92,12 +92,14 @@ def run_is_over(run: RunState, scenario: Scenario, clock: float) -> bool:
             and run.tasks.keys() >= {timed.task.id for timed in scenario.tasks}
             and all((status := run.status(name)) and status.state in FINAL_STATES
                     for name in run.tasks)
-            and all(uav.id in dead or _at_rest(run.uavs.get(uav.id))
+            and all(uav.id in dead or _at_rest(run.uavs.get(uav.id), run.lists.get(uav.id))
                     for uav in scenario.uavs))
 
 
-def _at_rest(state: Line | None) -> bool:
+def _at_rest(state: Line | None, uav_list: Line | None) -> bool:
     if state is None:
         return False
     speed = math.hypot(*(v or 0.0 for v in state['velocity']))
-    return speed < _AT_REST and state['mode'] in ('STANDBY', 'HOLD', 'FAULT')
+    at_place = state['mode'] == 'ON_MISSION' and uav_list is not None and uav_list.get('waits')
+    return speed < _AT_REST and (
+        bool(at_place) or state['mode'] in ('STANDBY', 'HOLD', 'FAULT'))
