@@ -108,6 +108,13 @@ def test_more_pages_than_the_limit_are_refused(run, serve):
     assert request(server, 'GET', '/stream')[0].status == 503
 
 
+@pytest.mark.skipif(not hasattr(socket, 'TCP_USER_TIMEOUT'), reason='Linux only')
+def test_a_page_that_vanishes_from_the_network_frees_its_stream(run, serve):
+    """A tablet whose radio drops would hold one of the streams for a quarter of an hour."""
+    server = serve(run.snapshots)
+    assert server.socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 20_000
+
+
 def test_a_stopped_server_releases_its_port(run, serve):
     server = serve(run.snapshots)
     server.stop()

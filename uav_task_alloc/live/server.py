@@ -18,6 +18,7 @@ from aiohttp import web
 from uav_task_alloc.live.snapshot_store import UPDATE_PERIOD, SnapshotStore
 from uav_task_alloc.live.tiles import TileSource
 
+UNANSWERED = 20_000  # [ms] after which a page that has vanished from the network frees its stream
 MAX_STREAMS = 32
 PAGE_FILES = {'/': ('index.html', 'text/html'), '/live.css': ('live.css', 'text/css'),
         **{f'/{name}.js': (f'{name}.js', 'text/javascript')
@@ -69,6 +70,8 @@ class PageServer:
         self.host = host
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         self.socket = socket.create_server((host, port), family=family)
+        if hasattr(socket, 'TCP_USER_TIMEOUT'):  # Linux; accepted connections inherit it
+            self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNANSWERED)
         self.port: int = self.socket.getsockname()[1]
         self.streams = 0
         self.loop = asyncio.new_event_loop()
