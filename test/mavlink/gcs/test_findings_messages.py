@@ -4,11 +4,12 @@ import math
 
 import pytest
 from findings_bench import BOTH
-from flight_bench import FlightBench
+from flight_bench import FlightBench, flying
 from link_bench import heartbeat, receive
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
 from uav_task_alloc.mavlink.mission.download import DownloadState
 from uav_task_alloc.mavlink.mission.items import Item, MissionStop, TaskList, all_alike
@@ -58,6 +59,20 @@ def test_finding_10_an_item_without_a_valid_position_is_dropped_and_logged_once(
     assert 'system 1, component 1' in refusals.last
     assert bench.run(lambda: bench.completed() == list('ABC'))
     assert refusals.count == 3
+
+
+@BOTH
+@pytest.mark.parametrize(('other', 'autopilot'), [
+    (d.MAV_TYPE_ONBOARD_CONTROLLER, d.MAV_AUTOPILOT_INVALID),
+    (d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_GENERIC)], ids=['companion', 'station'])
+def test_a_heartbeat_of_no_autopilot_says_nothing_of_the_vehicle(kind, other, autopilot):
+    bench = flying(kind)
+    for _ in range(3):
+        bench.from_vehicle(d.MAVLink_heartbeat_message(other, autopilot, 0, 0, 4, 3))
+    assert bench.run(lambda: bench.completed() == list('ABC'))
+    assert bench.authority() is AuthorityState.HELD
+    assert (f'HEARTBEAT (system 1, component 1): type = {other}, autopilot = {autopilot}: '
+            'expected an autopilot') in bench.ground_station.refusals.notes[0].text
 
 
 @pytest.mark.parametrize(('message', 'words'), [

@@ -122,6 +122,13 @@ class GroundStation:
         system = message.get_srcSystem()
         if message.get_srcComponent() != d.MAV_COMP_ID_AUTOPILOT1:
             return []
+        if message.get_type() == 'HEARTBEAT' and not _is_of_autopilot(message):
+            # its mode and arming are not those of the vehicle
+            if system in self.sessions:
+                self.refusals.add(
+                    f'system {system}, component 1', 'HEARTBEAT', f'type = {message.type}, '
+                    f'autopilot = {message.autopilot}: expected an autopilot')
+            return []
         session = self.sessions.get(system) or self._discover(address, message, now)
         if session is None:
             self._early.keep(address, message, now)
@@ -245,8 +252,6 @@ class GroundStation:
     def _discover(self, address: RemoteKey, message: Message, now: float) -> VehicleSession | None:
         config, system = self._config, message.get_srcSystem()
         if (message.get_type() != 'HEARTBEAT' or system in (0, config.system)
-                or message.autopilot == d.MAV_AUTOPILOT_INVALID
-                or message.type == d.MAV_TYPE_GCS
                 or (config.system_ids and system not in config.system_ids)):
             return None
         peer = Peer(system, message.get_srcComponent(), config.system, config.component)
@@ -278,3 +283,8 @@ class GroundStation:
     @staticmethod
     def _addressed(session: VehicleSession, messages: Iterable[Message]) -> Outgoing:
         return [(session.address, message) for message in messages]
+
+
+def _is_of_autopilot(heartbeat: Message) -> bool:
+    return bool(heartbeat.autopilot != d.MAV_AUTOPILOT_INVALID
+                and heartbeat.type != d.MAV_TYPE_GCS)
