@@ -220,13 +220,21 @@ def test_it_does_not_take_off_into_a_zone_in_which_it_stands(kind):
 # two vehicles with one system id at one address
 
 @BOTH
-def test_of_two_vehicles_with_one_system_id_none_is_armed(kind):
+@pytest.mark.parametrize(('place', 'ahead', 'behind'), [
+    ((-400.0, -300.0, 0.0), 0, 0), ((-400.0, -300.0, 0.0), 0, 20),
+    ((0.0, 15.0, 0.0), 50_000, 0), ((0.0, 15.0, 0.0), 50_000, 20)],
+    ids=['far', 'far, frames behind', 'near', 'near, frames behind'])
+def test_of_two_vehicles_with_one_system_id_none_is_armed(kind, place, ahead, behind):
     bench = FlightBench(kind)
-    first, other = bench.vehicles[1], make_vehicle(kind, 1, position=(-400.0, -300.0, 0.0))
+    first, other = bench.vehicles[1], make_vehicle(kind, 1, position=place)
     codec, step, receive = Codec(1, 1), first.step, first.receive
+    for _ in range(256 - behind):
+        codec.pack(d.MAVLink_mission_item_reached_message(0))  # in a link before
 
     def down(messages):
         for m in messages:
+            if hasattr(m, 'time_boot_ms'):
+                m.time_boot_ms += ahead
             bench.line.send('down', 1, codec, m, bench.now)
 
     def step_both(now):
@@ -257,3 +265,11 @@ def test_positions_of_a_fast_simulator_or_after_one_reset_are_of_one_vehicle():
     for n in range(25):  # late messages of before a reboot
         found.receive((500.0 * (n % 2), 0.0, 50.0), 3.0 + 0.1 * n, 30.0 + 0.2 * n)
     assert not found.found(35.0)
+
+
+def test_late_positions_are_of_one_vehicle():
+    found = TwoVehicles()
+    for n in range(200):  # of 2 s before, as on a second and slower way
+        found.receive((20.0 * n, 0.0, 50.0), 1.0 * n, 1.0 * n)
+        found.receive((20.0 * n - 40.0, 0.0, 50.0), n - 2.0, 1.0 * n, late=True)
+        assert not found.found(1.0 * n)

@@ -217,6 +217,8 @@ class Telemetry:
         self.received_ids.add(message.get_msgId())
         self.received_last[message.get_msgId()] = now
         if message.get_type() in STATE_REPORTS and not self._is_newest(message, now):
+            if message.get_type() == 'GLOBAL_POSITION_INT' and self.has_position:
+                self._compare(message, now, late=True)
             return False
         handler = self._handlers.get(message.get_type())
         if handler:
@@ -289,13 +291,18 @@ class Telemetry:
         self.altitude = message.alt * 1e-3
         self.position, self.velocity = self.enu_of(message)
         self.position_at = now
-        self.two_vehicles.receive(self.position, message.time_boot_ms * 1e-3, now)
+        self._compare(message, now)
         start, start_at = self._paced
         if now - start_at >= _PACE_OVER:
             moved = math.dist(self.position, start)
             self.pace = 0.0 if math.isnan(moved) else moved / (now - start_at)
             self._paced = self.position, now
         self.height = message.relative_alt * 1e-3
+
+    def _compare(self, message: Message, now: float, late: bool = False) -> None:
+        """Compare a position with the one before: both may be of two vehicles."""
+        self.two_vehicles.receive(self.enu_of(message)[0], message.time_boot_ms * 1e-3, now, late,
+                                  self.clock_rate.value)
 
     def enu_of(self, message: Message) -> tuple[Point, Point]:
         """Position [m] and velocity [m/s], both ENU, of a GLOBAL_POSITION_INT."""
