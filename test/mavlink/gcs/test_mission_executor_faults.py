@@ -131,20 +131,34 @@ def test_fault_23_late_answers_of_before_an_upload_do_not_make_it_infeasible(kin
     assert (len(late), bench.failed()) == (3, [])
 
 
-@BOTH
-def test_fault_23_accepted_and_then_no_mission_is_infeasible(kind):
-    bench = FlightBench(kind).discover()
+def losing_missions(kind, times):
+    """A vehicle that has no mission on board after the first acceptances."""
+    bench, left = FlightBench(kind).discover(), [times]
 
     def vanish(direction, message, now):
-        if direction == 'down' and message.get_type() == 'MISSION_ACK':
+        if direction == 'down' and message.get_type() == 'MISSION_ACK' and left[0]:
+            left[0] -= 1
             del bench.vehicles[1].mission.items[1 if kind == 'ardupilot' else 0:]
         return None
     bench.line.tampers.append(vanish)
     bench.assign(task_list('AB'))
+    return bench
+
+
+@BOTH
+def test_a_mission_that_another_station_clears_at_once_is_uploaded_again(kind):
+    bench = losing_missions(kind, 1)
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+    assert (bench.failed(), bench.onboard().upload.uploads) == ([], 2)
+
+
+@BOTH
+def test_fault_23_accepted_and_then_no_mission_is_infeasible(kind):
+    bench = losing_missions(kind, 99)
     assert bench.run(lambda: len(bench.failed()) == 2, 60.0)
     reason = bench.events[-1][1].reason
     assert reason == 'accepted, but no mission is on board: infeasible'
-    assert bench.onboard().upload.uploads == 1
+    assert bench.onboard().upload.uploads == 2
 
 
 @pytest.fixture

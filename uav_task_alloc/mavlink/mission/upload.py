@@ -87,6 +87,7 @@ class Upload:
         self._requested: int | None = None
         self._sent_last = self._accepted = False
         self._empty = 0  # readbacks that were empty, though it was accepted
+        self._was_empty = False  # so they were in the try before
         self._sent_once = False  # the last item of this mission, in this try or an earlier one
         self.sent_before = False  # the last item, in an earlier try: it may fly that mission
         self._read_at = -math.inf  # [s] end of a readback; it may not know that (ACK lost)
@@ -180,9 +181,11 @@ class Upload:
         if self.state in (UploadState.BACKOFF, UploadState.DRAINING) and self._pending:
             self._mission, self._pending = self._pending, None  # nothing runs: nothing to abort
             self._tries, self._sent_once, self.sent_before = 0, False, False
+            self._was_empty = False
         elif self.state is UploadState.IDLE and self._pending:
             self._mission, self._pending = self._pending, None
             self._tries, self._sent_once, self.sent_before = 0, False, False
+            self._was_empty = False
             self._go(UploadEvent.START, now)
         elif self.state is UploadState.IDLE and self._read_pending:
             self._mission, self._read_pending = None, False
@@ -304,6 +307,9 @@ class Upload:
         elif done and self._accepted and len(held) <= self._mission.own and self._empty < _LATE:
             self._empty += 1  # perhaps a late answer to a request sent before the upload
             self._enter(UploadState.READING, now)
+        elif done and self._accepted and len(held) <= self._mission.own and not self._was_empty:
+            self._was_empty = True  # perhaps another station has cleared it: once more
+            self._go(UploadEvent.MISMATCH, now)
         elif done and self._accepted and len(held) <= self._mission.own:
             self._fail('accepted, but no mission is on board: infeasible')
             self._go(UploadEvent.UNREAD, now)
