@@ -75,6 +75,16 @@ def test_a_heartbeat_of_no_autopilot_says_nothing_of_the_vehicle(kind, other, au
             'expected an autopilot') in bench.ground_station.refusals.notes[0].text
 
 
+@BOTH
+def test_a_home_at_0_0_is_none(kind):
+    bench = FlightBench(kind).discover()
+    assert bench.run(lambda: bench.state().home is not None, 10.0)
+    before = bench.state().home
+    bench.from_vehicle(d.MAVLink_home_position_message(
+        0, 0, 0, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0))
+    assert bench.state().home == before
+
+
 @pytest.mark.parametrize(('message', 'words'), [
     (d.MAVLink_global_position_int_message(0, 2**31 - 1, 0, 0, 0, 0, 0, 0, 0),
      'lat = 2147483647: expected a number in [-900000000, 900000000]'),

@@ -331,6 +331,8 @@ class Telemetry:
         self._estimates = bool(message.flags & d.EKF_POS_HORIZ_ABS)
 
     def _home(self, message: Message, now: float) -> None:
+        if (message.latitude, message.longitude) == (0, 0):
+            return  # not known, as in GLOBAL_POSITION_INT
         self.home = to_enu(self._origin, message.latitude * 1e-7, message.longitude * 1e-7,
                            message.altitude * 1e-3)
 
