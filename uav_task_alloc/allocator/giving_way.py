@@ -29,7 +29,7 @@ class GivingWay:
     Args:
         world: of the allocator.
         waiting: which UAVs are idle, and their lists without tasks.
-        watch: who holds for whom.
+        watch: which UAVs hold for which ones.
     """
 
     def __init__(self, world: World, waiting: WaitingPlaces, watch: SeparationWatch) -> None:

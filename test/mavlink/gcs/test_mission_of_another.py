@@ -220,15 +220,15 @@ def test_it_does_not_take_off_into_a_zone_in_which_it_stands(kind):
 # two vehicles with one system id at one address
 
 @BOTH
-@pytest.mark.parametrize(('place', 'ahead', 'behind'), [
+@pytest.mark.parametrize(('place', 'ahead', 'lag'), [
     ((-400.0, -300.0, 0.0), 0, 0), ((-400.0, -300.0, 0.0), 0, 20),
     ((0.0, 15.0, 0.0), 50_000, 0), ((0.0, 15.0, 0.0), 50_000, 20)],
-    ids=['far', 'far, frames behind', 'near', 'near, frames behind'])
-def test_of_two_vehicles_with_one_system_id_none_is_armed(kind, place, ahead, behind):
+    ids=['far', 'far, frames late', 'near', 'near, frames late'])
+def test_of_two_vehicles_with_one_system_id_none_is_armed(kind, place, ahead, lag):
     bench = FlightBench(kind)
     first, other = bench.vehicles[1], make_vehicle(kind, 1, position=place)
     codec, step, receive = Codec(1, 1), first.step, first.receive
-    for _ in range(256 - behind):
+    for _ in range(256 - lag):
         codec.pack(d.MAVLink_mission_item_reached_message(0))  # in a link before
 
     def down(messages):

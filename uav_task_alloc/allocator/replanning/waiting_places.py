@@ -53,7 +53,7 @@ class WaitingPlaces:
         self._event: object = None  # what the last choice was made for
         self._choice: WaitingChoice | None = None  # imported once it is wanted: it loads kernels
         self._stays: dict[str, str] = {}  # why a UAV was not sent, by id
-        self._gives_way: dict[str, tuple[str, Point]] = {}  # for whom, and the place, by id
+        self._gives_way: dict[str, tuple[str, Point]] = {}  # the other UAV, and the place, by id
 
     @property
     def on(self) -> bool:
@@ -85,7 +85,7 @@ class WaitingPlaces:
         self._gives_way[uav_id] = other, place
 
     def _gives_way_to(self, each: UavList) -> str:
-        """Whom a UAV gives way to by a list; '': nobody."""
+        """The UAV that one gives way to by a list; '': none."""
         other, place = self._gives_way.get(each.uav, ('', None))
         return other if each.waiting_place == place else ''
 
