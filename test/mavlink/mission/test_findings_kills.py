@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 from authority_bench import ARDUPILOT, BOTH, MODES, PX4, flying
 from evidence_bench import Flight
-from findings_bench import distance, drop_messages, flown_once_each, happened
+from findings_bench import distance, drop_messages, flown_once_each, happened, set_current
 from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -356,3 +356,27 @@ def test_the_clock_of_a_reboot_drops_no_positions_that_came_since_the_bridge_was
         PositionSample(3.0, (105.0, 0.0, 0.0), (0.0, 0.0, 0.0)), True, flight.now, flight.frame())
     flight.table.invalidate()
     assert list(flight.table.completed) == ['A']
+
+
+@ARDUPILOT
+def test_a_reboot_completes_no_task_of_an_upload_that_was_made_again_after_a_restart(kind):
+    bench = flying(kind, 'ABC')
+    bench.assign(task_list('ABC', 2, service=4.0))
+    assert bench.run(lambda: distance(bench, AT_A) < 1.0)
+    bench.run(limit=1.5)
+    for message, seconds in (
+            ('MISSION_ITEM_REACHED', 5.0), ('MISSION_REQUEST', 5.0), ('MISSION_COUNT', 9.0)):
+        drop_messages(bench, 'down', message, lambda m, end=bench.now + seconds: bench.now < end)
+    bench.assign(task_list('DEA', 3))
+    assert bench.run(lambda: bench.onboard().state is MissionState.UPLOADING, 5.0)
+    bench.kill_and_restart(0.0)
+    bench.run(limit=2.0)
+    set_current(bench, 2)
+    bench.run(limit=2.0)
+    bench.assign(task_list('DEA', 4))
+    assert bench.run(lambda: bench.onboard().verified(), 60.0)
+    bench.run(limit=4.0)
+    bench.vehicles[1].reboot(bench.now)  # it falls
+    bench.run(limit=30.0)
+    assert places(bench) == ['A']
+    assert set(bench.completed()) <= {'A'}

@@ -69,10 +69,11 @@ class Resume:
     def rebooted(self) -> None:
         """Reset after a restart of the vehicle, whose current item starts at the first."""
         _, recorded, arrived = self.recorded
-        self._passed_recorded = arrived and recorded is not None and any(
+        self._passed_recorded = not self.located and arrived and recorded is not None and any(
             each.seq > recorded for each in self._unread.currents)
         self._unread.restarted(self.located)
-        self.passed = () if self.located else self.passed
+        if self.located:  # the record is of a mission that may have been replaced since
+            self.passed = self.recorded_upload = ()
         self.reset()
         self._rebooted = True
 
@@ -225,6 +226,7 @@ class Resume:
         if len(upload) != 2 or not upload[0] == checksum(held) != self.recorded[0]:
             return False
         self.recorded, self.passed = (upload[0], upload[1], False), ()
+        self._passed_recorded = False  # of the mission that it has replaced
         return True
 
     def _continues_recorded(self, held: tuple[Item, ...]) -> bool:
