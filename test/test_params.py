@@ -68,12 +68,17 @@ def test_the_objectives_of_the_allocator_are_those_of_the_solver():
     assert highest['trips'] == MAX_TRIPS
 
 
-@pytest.mark.parametrize('weights', [(1.0,), (1.0, 0.0, 0.0, 0.0, -1.0),
+@pytest.mark.parametrize('weights', [(1.0,), (1.0, 0.0, 0.0, 0.0, -1.0), (0.0,) * 5,
                                      (math.nan, 0.0, 0.0, 0.0, 0.0)])
 def test_the_weights_of_an_objective_are_five_prices_or_none(weights):
     with pytest.raises(InvalidValue, match=r'objective_weights = .*: expected five numbers'):
         params.AllocatorParams(objective_weights=weights)
     params.AllocatorParams(objective_weights=(1, 0.5, 0, math.inf, math.inf))
+
+
+def test_an_objective_by_which_all_plans_are_equal_is_refused():
+    with pytest.raises(InvalidValue, match=r'objective = \[0.*: expected one price that is not 0'):
+        Objective(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize('value', [0.0, 5e-324, 1e9, 1.1e9, 1e300, math.inf])

@@ -81,7 +81,7 @@ class Objective:
             and where not all can, the most value is.
 
     Raises:
-        InvalidValue: a coefficient is out of range.
+        InvalidValue: a coefficient is out of range, or all are 0.
     """
 
     distance: float = 1.0  # [1/m]
@@ -99,6 +99,8 @@ class Objective:
             if 1e9 < number < math.inf:
                 raise InvalidValue(f'objective: {name}', number, 'a number in [0, 1e+09], or inf')
             object.__setattr__(self, name, number)
+        if not any(self.coefficients):
+            raise InvalidValue('objective', self.coefficients.tolist(), 'one price that is not 0')
 
     @property
     def coefficients(self) -> NDArray[np.float64]:

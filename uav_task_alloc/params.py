@@ -109,12 +109,12 @@ class AllocatorParams(FrameParams):
     def __post_init__(self) -> None:
         FrameParams.__post_init__(self)
         prices = self.objective_weights
-        if len(prices) not in (0, 5) or not all(
+        if len(prices) not in (0, 5) or (prices and not any(prices)) or not all(
                 0.0 <= price <= _MAX_PRICE or (price == math.inf and number in _RULES)
                 for number, price in enumerate(prices)):
             raise InvalidValue('objective_weights', list(prices),
                                f'five numbers in [0, {_MAX_PRICE:g}] (distance, finish, response, '
-                               'lateness, unserved), the last two also .inf, or none')
+                               'lateness, unserved), the last two also .inf, not all 0; or none')
         area = self.anticipate_area
         if area and not (len(area) == 4 and max(map(abs, area)) <= MAX_RANGE
                          and area[0] < area[2] and area[1] < area[3]):

@@ -89,6 +89,13 @@ def test_a_file_that_is_there_is_checked_and_left_as_it_is(tmp_path):
     assert path.read_text() == 'old'
 
 
+def test_the_dash_of_other_programs_makes_no_file_of_that_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(outputs.InvalidValue, match=r"--json = '-': expected .* /dev/stdout is"):
+        outputs.check_file('--json', Path('-'))
+    outputs.check_file('--json', Path('./-x'))
+
+
 def test_a_pipe_and_a_device_are_accepted(tmp_path):
     os.mkfifo(tmp_path / 'pipe')
     outputs.check_file('--json', tmp_path / 'pipe')

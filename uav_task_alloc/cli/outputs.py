@@ -56,6 +56,8 @@ def check_file(option: str, path: Path | None, suffixes: Sequence[str] = (),
     """
     if path is None:
         return
+    if str(path) == '-':
+        raise InvalidValue(option, '-', 'the name of a file; /dev/stdout is standard output')
     if suffixes and path.suffix.lower() not in suffixes:
         raise InvalidValue(option, str(path), f'a name that ends with {" or ".join(suffixes)}')
     if not suffixes and path.suffix.lower() in _INPUT_SUFFIXES:
