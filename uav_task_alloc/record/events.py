@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.record.record_file import Line
 from uav_task_alloc.record.run_state import RunState
+from uav_task_alloc.zone_codec import decode_zone
 
 _MAX_NAMED = 3  # ids in one sentence
 Sentence = tuple[str, str]  # (kind: task, good, fault, zone, uav or plan; sentence)
@@ -66,10 +67,13 @@ def proposal_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
 
 
 def zone_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
-    """Zones that are new or removed."""
-    old = {zone.id for zone in state.zones_now()}
-    new = {row['id'] for row in line['zones']} | old.intersection(line.get('kept', ()))
-    for names, text in ((new - old, 'new zone {}'), (old - new, 'zone {} removed')):
+    """Zones that are new, changed or removed."""
+    old = {zone.id: zone for zone in state.zones_now()}
+    given = {row['id']: decode_zone(row) for row in line['zones']}
+    new = given.keys() | old.keys() & set(line.get('kept', ()))
+    changed = {name for name in given.keys() & old.keys() if given[name] != old[name]}
+    for names, text in ((new - old.keys(), 'new zone {}'), (changed, 'zone {} changed'),
+                        (old.keys() - new, 'zone {} removed')):
         if names:
             yield 'zone', text.format(_ids(sorted(names)))
 
