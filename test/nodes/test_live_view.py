@@ -188,8 +188,9 @@ def test_uploads_and_health_are_taken_from_the_diagnostics():
             ('clock_rate', '7.980'))])
     assert diagnostic_records.uploads_record(DiagnosticArray(status=[status])) == {
         'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4},
-        'health': {'uav_1': [1, 'link stale']}, 'clock_rates': {'uav_1': 7.98}, 'uav_warnings': {},
-        'orders': {}, 'battery_reserves': {}, 'waiting': {},
+        'health': {'mavlink_bridge: uav_1': [1, 'link stale', 'uav_1']},
+        'clock_rates': {'uav_1': 7.98}, 'uav_warnings': {}, 'orders': {},
+        'battery_reserves': {}, 'waiting': {},
         'authority': {'uav_1': {'state': 'LOST', 'why': 'why', 'for': 12.0,
                                 'back': '~/hand_over'}}}
 

@@ -24,3 +24,45 @@ def test_a_zone_that_changes_is_an_event_and_one_that_is_repeated_is_not(then, t
     run = RunState()
     run.apply(zones(0.0, ONE, OTHER))
     assert [text for _, text in sentences(run, then)] == texts
+
+
+def reports(wall, health=(), **uploads):
+    return {'kind': 'uploads', 'wall': wall, 'uploads': uploads, 'health': {
+        name: [level, text, 'u1'] for name, level, text in health}}
+
+
+LINK, LENS = ('/bridge: u1', 1, 'link stale'), ('/camera: lens', 2, 'lens covered')
+
+
+@pytest.mark.parametrize(('rows', 'shown'), [
+    ([[LINK], [('/camera: lens', 0, 'ok')]], 'link stale'),
+    ([[LINK], [LENS]], 'lens covered; link stale'), ([[LINK, LENS]], 'lens covered; link stale'),
+    ([[LINK], [LENS], [('/bridge: u1', 0, 'mission VERIFIED')]], 'lens covered'),
+    ([[LINK], [('/bridge_2: u1', 1, 'link stale')]], 'link stale')])
+def test_a_report_of_one_node_on_a_uav_does_not_hide_that_of_another(rows, shown):
+    run = RunState()
+    for wall, row in enumerate(rows):
+        run.apply(reports(float(wall), row))
+    assert run.trouble('u1') == shown
+
+
+def test_the_report_of_a_node_that_has_ended_gives_way_to_those_of_another():
+    run = RunState()
+    run.apply(reports(0.0, [LINK]))
+    run.apply(reports(30.0, [('/bridge_2: u1', 0, 'mission VERIFIED')]))
+    assert run.trouble('u1') == ''
+
+
+def test_recordings_of_earlier_versions_have_one_report_of_a_uav():
+    run = RunState()
+    for level, shown in ((1, 'link stale'), (0, '')):
+        run.apply({'kind': 'uploads', 'wall': 0.0, 'uploads': {},
+                   'health': {'u1': [level, 'link stale']}})
+        assert run.trouble('u1') == shown
+
+
+def test_uploads_of_a_bridge_that_was_restarted_count():
+    run = RunState()
+    for wall, (one, two) in enumerate(((3, 1), (0, 1), (2, 1), (1, 4))):
+        run.apply(reports(float(wall), u1=one, u2=two))
+    assert run.uploads == 3 + 2 + 1 + 4

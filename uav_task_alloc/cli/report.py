@@ -174,7 +174,7 @@ def summary_table(summary: Mapping[str, Any]) -> str:
         ('re-plans', of('replans'), f'{unchanged} more changed nothing' * bool(unchanged)),
         ('re-solve time', f'{of("resolve_ms_median"):.0f} ms',
          f'p99 {of("resolve_ms_p99"):.0f} ms'),
-        ('uploads', of('uploads'), ''),
+        ('uploads', of('uploads'), 'begun, repeated ones included'),
         ('UAVs lost', of('uavs_lost'), ''),
         ('wall time', f'{of("wall_s"):.1f} s', ''),
     ]

@@ -40,8 +40,8 @@ def uploads_record(msg: _Message) -> RecordBody:
         msg: DiagnosticArray of one fleet.
 
     Returns:
-        Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text] by
-        hardware id, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
+        Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text, hardware
+        id] likewise, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
         UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator; `waiting`: where
         idle UAVs wait, likewise; `orders`: of
         operators, texts by id, likewise; `battery_reserves`: shares by its name; `stamp`
@@ -55,10 +55,10 @@ def uploads_record(msg: _Message) -> RecordBody:
         'uav_warnings': warnings, 'waiting': dict(_of_allocators(msg, WAITING)),
         'orders': dict(_of_allocators(msg, ORDER)),
         'battery_reserves': dict(_battery_reserves(msg)), 'health': {
-            status.hardware_id or status.name: [
+            status.name: [
                 status.level if isinstance(status.level, int) else ord(status.level),
-                status.message]
-            for status in msg.status}}
+                status.message, status.hardware_id]
+            for status in msg.status if status.hardware_id}}
 
 
 def _upload_counts(msg: _Message) -> Iterable[tuple[str, int]]:

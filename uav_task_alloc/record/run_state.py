@@ -13,6 +13,7 @@ from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.allocator_reports import ALLOCATOR_SILENT, AllocatorReports
+from uav_task_alloc.record.bridge_reports import BridgeReports
 from uav_task_alloc.record.clock_comparison import (
     MAX_STAMP_AGE,
     RATE_TOLERANCE,
@@ -69,8 +70,7 @@ class RunState:
     ways_home: WaysHome = field(default_factory=WaysHome)  # as planned
     uavs: dict[str, Line] = field(default_factory=dict)  # the newest state of each
     verified: dict[str, set[int]] = field(default_factory=dict)  # list revisions on board, by UAV
-    upload_counts: dict[str, int] = field(default_factory=dict)  # by UAV, from diagnostics
-    health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text by UAV
+    bridges: BridgeReports = field(default_factory=BridgeReports)  # what they report of UAVs
     # what they report of themselves
     allocators: AllocatorReports = field(default_factory=AllocatorReports)
     proposal: Line | None = None  # the last plan that waited for an operator
@@ -304,9 +304,7 @@ class RunState:
 
     def on_uploads(self, line: Line) -> None:
         """Diagnostics of the bridge: uploads, health, authority and clocks of its UAVs."""
-        self.upload_counts.update(line['uploads'])
-        self.health.update((uav, (level, text))
-                           for uav, (level, text) in line.get('health', {}).items())
+        self.bridges.apply(line, self.stretch)
         self.allocators.apply(line, self.stretch)
         self.clock_rates.update(line.get('clock_rates', {}))
         if self.measured and self.clock_rates:
@@ -346,16 +344,13 @@ class RunState:
 
     def trouble(self, uav: str) -> str:
         """What is wrong with a UAV, by its bridge and the allocators; '' where all is well."""
-        level, text = self.health.get(uav, (0, ''))
-        return '; '.join([text or 'a warning without a text'] * bool(level)
-                         + self.allocators.warnings(uav))
+        return '; '.join(self.bridges.warnings(uav) + self.allocators.warnings(uav))
 
     @property
     def uploads(self) -> int:
-        """Number of verified uploads: the bridge's count, or the list revisions seen on board."""
-        if self.upload_counts:
-            return sum(self.upload_counts.values())
-        return sum(len(revisions) for revisions in self.verified.values())
+        """Uploads begun, by the bridges' counts; without one, the list revisions seen on board."""
+        begun = self.bridges.uploads
+        return sum(map(len, self.verified.values())) if begun is None else begun
 
     def count(self, *states: str) -> int:
         """Number of tasks in one of these states."""

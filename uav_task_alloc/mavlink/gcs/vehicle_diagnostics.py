@@ -32,7 +32,7 @@ class VehicleFacts:
     epoch: int
     item: str  # current item and number of items
     upload: str
-    uploads: int  # number of uploads
+    uploads: int  # begun, also those that were repeated or failed
     restarts: int  # number of restarts of the vehicle
     silent_for: str  # time since its last message
     clock_rate: str  # its seconds in one second of the bridge; above 1 in a faster simulation

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What nodes report of single UAVs on `/diagnostics`: their health, and counts of uploads."""
+from __future__ import annotations
+
+from uav_task_alloc.record.record_file import Line
+
+_OUT_OF_DATE = 10.0  # [s] of real time that a report is older than another of its UAV
+
+
+class BridgeReports:
+    """The newest report of each node on each UAV; several nodes may report one UAV.
+
+    Arguments of methods:
+        line: of kind `uploads`.
+        second: of real time, in those of the record.
+        uav: id.
+    """
+
+    def __init__(self) -> None:
+        self._counts: dict[str, tuple[int, int]] = {}  # by status: newest, of earlier runs
+        # by UAV, then status: [unix s], level, text
+        self._health: dict[str, dict[str, tuple[float, int, str]]] = {}
+
+    def apply(self, line: Line, second: float) -> None:
+        """Take the reports of a line."""
+        for name, count in line['uploads'].items():
+            last, earlier = self._counts.get(name, (0, 0))
+            self._counts[name] = count, earlier + (last if count < last else 0)
+        # in recordings of earlier versions a row has no UAV: its name is the UAV
+        for name, (level, text, *uavs) in line.get('health', {}).items():
+            uav = uavs[0] if uavs else name
+            known = {other: row for other, row in self._health.get(uav, {}).items()
+                     if line['wall'] - row[0] <= _OUT_OF_DATE * second}
+            self._health[uav] = {**known, name: (line['wall'], level, text)}
+
+    def warnings(self, uav: str) -> list[str]:
+        """Return what is wrong with a UAV, the worst first.
+
+        Args:
+            uav: id.
+
+        Returns:
+            Texts; none where all is well.
+        """
+        rows = sorted(self._health.get(uav, {}).values(), key=lambda row: -row[1])
+        return list(dict.fromkeys(text or 'a warning without a text'
+                                  for _, level, text in rows if level))
+
+    @property
+    def uploads(self) -> int | None:
+        """Uploads begun, also by bridges that were restarted; None: no bridge counts them."""
+        return sum(map(sum, self._counts.values())) if self._counts else None
