@@ -109,6 +109,13 @@ def test_what_the_last_replan_changed(view, run):
     assert 'plan 4' not in text(page, '#replans')
 
 
+def test_the_state_of_a_task_that_the_last_replan_removed_is_the_present_one(view, run):
+    page = view(run.add(planned(BEGIN + 25, 3, 'background', u1=[], u2=['t3', 't4'])).snapshots)
+    wait(page, '#replan', '− t2 (assigned)')
+    run.add(statuses(BEGIN + 26, t2='UNASSIGNED  too far'))
+    wait(page, '#replan', '− t2 (unassigned)')
+
+
 def test_the_map_shows_zones_routes_and_tasks(view, run):
     page = view(run.snapshots)
     wait(page, '#map', 'z1')

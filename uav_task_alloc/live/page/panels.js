@@ -136,7 +136,8 @@ export function showPlans(model) {
       : 'No plan yet.', 'none')]);
   }
   const since = model.plans.length - model.plans.lastIndexOf(last) - 1;
-  fill($('replan'), `${last.revision} ${last.wall} ${since}`, () => [...planNodes(last, model),
+  const states = last.changes.flatMap(row => row.removed.map(([task]) => stateOf(task, model)[0]));
+  fill($('replan'), `${last.revision} ${last.wall} ${since} ${states}`, () => [...planNodes(last, model),
     ...(since ? [make('p', `Since then ${since} ${since > 1 ? 'plans' : 'plan'} changed nothing, `
       + `the last at ${stamp(newest.wall)}.`, 'faint')] : [])]);
   fill($('replans'), `${replans.length} ${last.wall}`, () =>
