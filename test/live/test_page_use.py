@@ -2,7 +2,7 @@
 """The live page by keyboard and screen reader, with long names, and with UAVs that come later."""
 import pytest
 from chromium import wait
-from small_run import BEGIN, FIRST, Run, state
+from small_run import BEGIN, FIRST, Run, announced, state, statuses
 
 LONG = 'mast_of_the_northern_line_' * 7
 
@@ -14,3 +14,29 @@ def test_a_long_name_of_a_uav_leaves_the_page_as_wide_as_the_window(view, width)
     page.set_viewport_size({'width': width, 'height': 844})
     wait(page, '#alarm', f'{LONG}: fault')
     assert page.evaluate('document.documentElement.scrollWidth') == width
+
+
+def test_a_uav_with_a_problem_is_announced_to_screen_readers(view):
+    page = view(Run().add(*FIRST, state(BEGIN, 'u9', (300.0, 300.0), mode='FAULT')).snapshots)
+    wait(page, '[role=alert] #alarm', 'u9: fault')
+
+
+def test_an_open_card_stays_open_with_its_focus_where_another_uav_comes(view):
+    run = Run().add(*FIRST)
+    page = view(run.snapshots)
+    page.click('#uavs [data-uav=u2] summary')
+    run.add(state(BEGIN + 1, 'u10', (300.0, 300.0)), state(BEGIN + 1, 'u0', (300.0, 300.0)))
+    wait(page, '#uav-count', '4')
+    assert page.locator('#uavs details[open]').evaluate_all(
+        'nodes => nodes.map(node => node.dataset.uav)') == ['u2']
+    assert page.evaluate('document.activeElement.parentNode.dataset.uav') == 'u2'
+
+
+def test_the_focus_stays_on_a_task_where_a_list_with_it_changes(view):
+    run = Run().add(*FIRST, announced(BEGIN, ['t4', 't5']),
+                    statuses(BEGIN, t4='UNASSIGNED  too far', t5='UNASSIGNED  too far'))
+    page = view(run.snapshots)
+    page.focus('#left button:has-text("t5")')
+    run.add(statuses(BEGIN + 1, t4='UNASSIGNED  too far', t5='UNASSIGNED  inside zone z1'))
+    wait(page, '#left', 'inside zone z1')
+    assert page.evaluate('document.activeElement.textContent') == 't5'

@@ -77,8 +77,9 @@ export function showUavs(model, centre) {
     if (by.length) by.forEach(row => add(...row));  // pieces, also of work that is not done
     else if (state === 'COMPLETED') add(uav, 1);
   }
+  const known = new Map([...$('uavs').children].map(node => [node.dataset.uav, node]));  // open ones
   fill($('uavs'), JSON.stringify(model.uavs.map(uav => uav.id)),
-    () => model.uavs.map(uav => card(uav, centre)));
+    () => model.uavs.map(uav => known.get(uav.id) || card(uav, centre)));
   model.uavs.forEach((uav, k) =>
     update($('uavs').children[k], uav, done.get(uav.id) || 0, model, colours));
 }

@@ -19,11 +19,17 @@ export function make(tag, text = '', kind = '') {
   return put(document.createElement(tag), text, kind);
 }
 
-// Replace the children of a node only where its key differs from that of the last call.
+// Replace the children of a node only where its key differs from that of the last call. The focus
+// stays where it was, or at a button of the same text.
 export function fill(node, key, nodes) {
   if (node.dataset.key === key) return;
   node.dataset.key = key;
+  const active = node.contains(document.activeElement) ? document.activeElement : null;
   node.replaceChildren(...nodes());
+  if (!active) return;
+  const same = node.contains(active) ? active
+    : [...node.querySelectorAll('button')].find(other => other.textContent === active.textContent);
+  same?.focus({preventScroll: true});
 }
 
 export function pick(id) {
