@@ -66,3 +66,13 @@ def test_uploads_of_a_bridge_that_was_restarted_count():
     for wall, (one, two) in enumerate(((3, 1), (0, 1), (2, 1), (1, 4))):
         run.apply(reports(float(wall), u1=one, u2=two))
     assert run.uploads == 3 + 2 + 1 + 4
+
+
+def test_warnings_that_are_of_no_uav_are_those_of_nodes_and_links_for_a_while():
+    run = RunState()
+    run.apply({'kind': 'uploads', 'wall': 0.0, 'uploads': {}, 'health': {
+        '/bridge: u1': [1, 'link stale', 'u1'], '/bridge: udpin': [2, 'closed', 'udpin'],
+        '/allocator: allocation': [1, '', ''], '/bridge: heartbeat': [0, '3 sent', 'heartbeat']}})
+    assert run.bridges.other_warnings(['u1'], 9.0, 1.0) == [
+        '/allocator: allocation: a warning without a text', '/bridge: udpin: closed']
+    assert run.bridges.other_warnings(['u1'], 11.0, 1.0) == []

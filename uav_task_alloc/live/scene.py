@@ -49,6 +49,7 @@ class Scene:
         self.routes: RouteLists | None = None  # of the last plan
         self.silent: set[str] = set()
         self.last_authority: LogEntry = {}
+        self.last_nodes: LogEntry = {'silent': None, 'warnings': []}
         self.last_orders: dict[str, dict[str, str]] = {}  # by allocator
         self.waiting: Line | None = None  # the plan that waits for an operator
         self.last: LogEntry = {'times': {}, 'works': {}}  # these parts as last sent
@@ -106,6 +107,8 @@ class Scene:
         authority = self.part('authority')  # a part of its own: it rarely changes
         if authority != self.last_authority:
             self.last_authority = parts['authority'] = authority
+        if (nodes := self.nodes(now, ended)) != self.last_nodes:
+            self.last_nodes = parts['nodes'] = nodes
         events = sorted(self.events, key=lambda entry: entry['wall'])
         self.dirty, self.new_plans, self.events = set(), [], []
         return parts, events, plans
@@ -191,6 +194,17 @@ class Scene:
             return {**known, 'why': '', 'since': None, 'back': ''}
         return {**known, 'why': reported.reason, 'back': reported.given_back_by,
                 'since': None if reported.since is None else round(reported.since)}
+
+    def nodes(self, now: float, ended: bool) -> LogEntry:
+        """Since when no allocator reports [unix s] (`silent`), and warnings that are of no UAV.
+
+        Args:
+            now, ended: see `updates`.
+        """
+        run = self.run
+        since = None if ended else run.allocators.silent_since(now, run.stretch)
+        return {'silent': since and round(since, 1),
+                'warnings': run.bridges.other_warnings(run.uavs, now, run.stretch)}
 
     def orders(self) -> LogEntry:
         """Orders in force, [id, text]; and the plan that waits for an operator, None for none."""

@@ -63,5 +63,16 @@ class AllocatorReports:
         """Whether all that have reported are silent now; False where none has."""
         return bool(self._last) and self._silent(wall, second) == self._last.keys()
 
+    def silent_since(self, wall: float, second: float) -> float | None:
+        """Return since when no allocator reports.
+
+        Args:
+            wall, second: see the class.
+
+        Returns:
+            [unix s] of the last report; None while one does, or where none ever did.
+        """
+        return max(self._last.values()) if self.have_ended(wall, second) else None
+
     def _silent(self, wall: float, second: float) -> set[str]:
         return {name for name, at in self._last.items() if wall - at > ALLOCATOR_SILENT * second}

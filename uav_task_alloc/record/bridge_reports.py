@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What nodes report of single UAVs on `/diagnostics`: their health, and counts of uploads."""
+"""What nodes report on `/diagnostics`: health of UAVs and of themselves, counts of uploads."""
 from __future__ import annotations
+
+from collections.abc import Container
 
 from uav_task_alloc.record.record_file import Line
 
+_MOST = 100  # warnings
 _OUT_OF_DATE = 10.0  # [s] of real time that a report is older than another of its UAV
 
 
 class BridgeReports:
-    """The newest report of each node on each UAV; several nodes may report one UAV.
+    """The newest report of each node on each UAV, link or itself; several may report one UAV.
 
     Arguments of methods:
         line: of kind `uploads`.
@@ -18,7 +21,7 @@ class BridgeReports:
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, int]] = {}  # by status: newest, of earlier runs
-        # by UAV, then status: [unix s], level, text
+        # by UAV or other hardware id, then status: [unix s], level, text
         self._health: dict[str, dict[str, tuple[float, int, str]]] = {}
 
     def apply(self, line: Line, second: float) -> None:
@@ -45,6 +48,23 @@ class BridgeReports:
         rows = sorted(self._health.get(uav, {}).values(), key=lambda row: -row[1])
         return list(dict.fromkeys(text or 'a warning without a text'
                                   for _, level, text in rows if level))
+
+    def other_warnings(self, uavs: Container[str], wall: float, second: float) -> list[str]:
+        """Return what is wrong apart from UAVs: with nodes, links and other parts.
+
+        Args:
+            uavs: ids of the known UAVs.
+            wall: present time [unix s]; reports that are out of date then are left out.
+            second: see the class.
+
+        Returns:
+            Texts that begin with the name of the status, in the order of names.
+        """
+        found = {name: text or 'a warning without a text'
+                 for hardware, rows in self._health.items() if hardware not in uavs
+                 for name, (at, level, text) in rows.items()
+                 if level and wall - at <= _OUT_OF_DATE * second}
+        return [f'{name}: {text}' for name, text in sorted(found.items())[:_MOST]]
 
     @property
     def uploads(self) -> int | None:

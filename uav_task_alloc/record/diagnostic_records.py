@@ -41,11 +41,10 @@ def uploads_record(msg: _Message) -> RecordBody:
 
     Returns:
         Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text, hardware
-        id] likewise, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
-        UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator; `waiting`: where
-        idle UAVs wait, likewise; `orders`: of
-        operators, texts by id, likewise; `battery_reserves`: shares by its name; `stamp`
-        [ROS s] of the message of an allocator.
+        id] likewise, which is the UAV in statuses of a bridge, '' of a node; `authority`,
+        `clock_rates`: by UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator;
+        `waiting`: where idle UAVs wait, likewise; `orders`: of operators, texts by id, likewise;
+        `battery_reserves`: shares by its name; `stamp` [ROS s] of the message of an allocator.
     """
     warnings = dict(_of_allocators(msg, UAV_WARNING))
     stamp = {'stamp': from_stamp(msg.header.stamp)} if warnings else {}
@@ -58,7 +57,7 @@ def uploads_record(msg: _Message) -> RecordBody:
             status.name: [
                 status.level if isinstance(status.level, int) else ord(status.level),
                 status.message, status.hardware_id]
-            for status in msg.status if status.hardware_id}}
+            for status in msg.status}}
 
 
 def _upload_counts(msg: _Message) -> Iterable[tuple[str, int]]:

@@ -6,8 +6,8 @@ import {drawChart} from './chart.js';
 import {drawGantt} from './gantt.js';
 import {pointsAhead} from './geo.js';
 import {FleetMap} from './map.js';
-import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showOrders,
-  showPlans}
+import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showNodes,
+  showOrders, showPlans}
   from './panels.js';
 import {answer, kindOf, live, ofDay, readModel, seconds, some, span, stamp} from './model.js';
 import {finishText, timesOf} from './times.js';
@@ -86,7 +86,8 @@ function show() {
   due = 0;
   showHead(model, past);
   const picked = showAnswer(model);
-  for (const panel of [showPlans, showOrders, showLeft, showEvents, showChart, showTimes]) {
+  for (const panel of [showNodes, showPlans, showOrders, showLeft, showEvents, showChart,
+    showTimes]) {
     panel(model);
   }
   showUavs(model, centre);

@@ -85,6 +85,16 @@ function showAlarm(uavs) {
   put($('alarm'), `▲ ${some(uavs.map(uav => `${uav.id}: ${why(uav)}`), 3)}`);
 }
 
+// What is wrong with nodes, links and other parts.
+export function showNodes({nodes: {silent, warnings}}) {
+  const texts = silent === null ? warnings : [`The allocator has not reported since ${
+    stamp(silent)} (${ofDay(silent)}): nothing is planned or counted as done, new zones are not `
+    + 'avoided, and UAVs go on with the lists that they have. Start it again.', ...warnings];
+  $('nodes').hidden = !texts.length;
+  fill($('nodes'), JSON.stringify(texts), () =>
+    texts.slice(0, MOST).map(text => make('li', `▲ ${text}`)));
+}
+
 // Returns the id of the task searched for, '' where there is none.
 export function showAnswer(model) {
   const typed = $('find').value.trim();
