@@ -76,3 +76,13 @@ def test_warnings_that_are_of_no_uav_are_those_of_nodes_and_links_for_a_while():
     assert run.bridges.other_warnings(['u1'], 9.0, 1.0) == [
         '/allocator: allocation: a warning without a text', '/bridge: udpin: closed']
     assert run.bridges.other_warnings(['u1'], 11.0, 1.0) == []
+
+
+@pytest.mark.parametrize(('reason', 'text'), [
+    ('cut again: zones changed', 'field#1, field#2 cut again: zones changed'),
+    ('cancelled', 'field#1, field#2 withdrawn')])
+def test_pieces_that_are_cut_again_are_not_said_to_be_withdrawn(reason, text):
+    line = {'kind': 'statuses', 'wall': 1.0, 'statuses': [
+        {'task': piece, 'state': 'CANCELLED', 'uav': '', 'reason': reason}
+        for piece in ('field#1', 'field#2')]}
+    assert list(sentences(RunState(), line)) == [('task', text)]

@@ -52,6 +52,8 @@ def status_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
             groups.setdefault((row['state'], row['uav'], row['reason']), []).append(row['task'])
     for (name, uav, reason), tasks in groups.items():
         kind, text = STATE_SENTENCES[name]
+        if name == 'CANCELLED' and reason.startswith('cut again'):  # of pieces, by no operator
+            kind, text = 'task', '{tasks} {reason}'
         if name == 'COMPLETED' and not uav:  # work of which several flew pieces
             text = '{tasks} completed'
         yield kind, text.format(tasks=_ids(tasks), uav=uav or 'no UAV',
