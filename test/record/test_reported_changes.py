@@ -86,3 +86,21 @@ def test_pieces_that_are_cut_again_are_not_said_to_be_withdrawn(reason, text):
         {'task': piece, 'state': 'CANCELLED', 'uav': '', 'reason': reason}
         for piece in ('field#1', 'field#2')]}
     assert list(sentences(RunState(), line)) == [('task', text)]
+
+
+def test_flown_pieces_that_the_allocator_has_forgotten_are_known_until_their_task_is_a_new_one():
+    def rows(wall, **states):
+        return {'kind': 'statuses', 'wall': wall, 'statuses': [
+            {'task': task.replace('_', '#'), 'state': state, 'uav': 'u1', 'reason': ''}
+            for task, state in states.items()]}
+    run = RunState()
+    add = {'kind': 'announcement', 'wall': 0.0, 'action': 'ADD', 'tasks': [
+        {'id': 'field', 'position': [1.0, 2.0, 3.0], 'work': 'AREA'}]}
+    for line in (add, rows(1.0, field='ASSIGNED', field_1='COMPLETED', field_2='ASSIGNED'),
+                 rows(2.0, field='COMPLETED', field_1='COMPLETED', field_2='COMPLETED'),
+                 rows(3.0), rows(4.0)):
+        run.apply(line)
+    assert {name: row.state for name, row in run.known_pieces().items()} == {
+        'field#1': 'COMPLETED', 'field#2': 'COMPLETED'}
+    run.apply({**add, 'wall': 5.0})
+    assert run.known_pieces() == {}

@@ -132,7 +132,7 @@ def planned_length(state: RunState, completed: Sequence[str]) -> float:
     """Length [m] of the legs to completed tasks and home, as planned when each became next."""
     known = state.known_statuses()
     rows = {**{name: known[name] for name in completed}, **{
-        piece: row for piece, row in state.pieces.items() if row.state == 'COMPLETED'}}
+        piece: row for piece, row in state.known_pieces().items() if row.state == 'COMPLETED'}}
     legs = [state.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
     return math.fsum(legs) + state.ways_home.total()
 

@@ -45,11 +45,12 @@ def piece_rows(history: FlightHistory) -> list[FlownPiece]:
     Returns:
         In the order of tasks and numbers.
     """
-    names = {name for name in (*history.listed, *history.run.pieces) if split_piece(name)[1]}
+    pieces = history.run.known_pieces()
+    names = {name for name in (*history.listed, *pieces) if split_piece(name)[1]}
     tracks = _segments(history)
     rows = []
     for name in sorted(names, key=split_piece):
-        status, way = history.run.pieces.get(name), history.run.ways.get(name, ())
+        status, way = pieces.get(name), history.run.ways.get(name, ())
         state = status.state if status else 'CUT AGAIN'
         share = float(np.mean(_flown(way, tracks)[1])) if len(way) > 1 else None
         rows.append(FlownPiece(

@@ -248,7 +248,7 @@ class Scene:
                 'holes': [[to_decimetres(point) for point in hole] for hole in task.holes],
                 'radius': task.radius, 'done': status.done if status else 0,
                 'pieces': status.pieces if status else 0, 'strips': [], 'by': {}}
-        for piece, status in run.pieces.items():
+        for piece, status in run.known_pieces().items():
             whole, _ = split_piece(piece)
             if status.state == 'COMPLETED' and whole in found:
                 by = found[whole]['by']

@@ -61,7 +61,7 @@ def piece_passes(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]
     tracks = {uav: [TrueSample(wall, point) for wall, point in resampled(track)]
               for uav, track in truth.tracks.items()}
     return {piece: _of_piece(tracks, truth, state.ways[piece])
-            for piece, status in state.pieces.items()
+            for piece, status in state.known_pieces().items()
             if status.state == 'COMPLETED' and piece in state.ways}
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from uav_task_alloc.model import Point, ThreatZone
+from uav_task_alloc.record.record_file import Line
 
 END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
 FINAL_STATES = (*END_STATES, 'UNASSIGNED')
@@ -24,6 +25,19 @@ class AnnouncedTask:
     path: tuple[Point, ...] = ()  # [m] of a LINE, or the outline of an AREA
     holes: tuple[tuple[Point, ...], ...] = ()  # [m]
     radius: float = 0.0  # [m] of an ORBIT
+
+
+def announced_task(row: Line, wall: float) -> AnnouncedTask:
+    """Return a task as it was announced.
+
+    Args:
+        row: of a line of kind `announcement`.
+        wall: when it was announced first [unix s].
+    """
+    return AnnouncedTask(
+        tuple(row['position']), wall, row.get('service', 0.0), row.get('earliest'),
+        row.get('latest'), row.get('work', ''), tuple(map(tuple, row.get('path', ()))),
+        tuple(tuple(map(tuple, hole)) for hole in row.get('holes', ())), row.get('radius') or 0.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ from uav_task_alloc.record.reported import (
     Service,
     SolveRecord,
     ZoneInterval,
+    announced_task,
 )
 from uav_task_alloc.record.ways_home import WaysHome
 from uav_task_alloc.zone_codec import decode_zone
@@ -54,6 +55,7 @@ class RunState:
     statuses: dict[str, ReportedStatus] = field(default_factory=dict)  # by task id
     ended: dict[str, ReportedStatus] = field(default_factory=dict)  # forgotten tasks, by id
     pieces: dict[str, ReportedStatus] = field(default_factory=dict)  # by id of the piece
+    flown_pieces: dict[str, ReportedStatus] = field(default_factory=dict)  # forgotten, likewise
     places: dict[str, Point] = field(default_factory=dict)  # [m] of listed tasks, by id
     ways: dict[str, list[Point]] = field(default_factory=dict)  # [m] of listed pieces, by id
     planned: dict[str, Service] = field(default_factory=dict)  # by task, of legs begun
@@ -131,12 +133,11 @@ class RunState:
                     self.cancelled.discard(task['id'])
                     if self.ended.pop(task['id'], None):  # forgotten, and now a new task
                         known = None
-                self.tasks[task['id']] = AnnouncedTask(
-                    tuple(task['position']), known.wall if known else self._announced_at(line),
-                    task.get('service', 0.0), task.get('earliest'), task.get('latest'),
-                    task.get('work', ''), tuple(map(tuple, task.get('path', ()))),
-                    tuple(tuple(map(tuple, hole)) for hole in task.get('holes', ())),
-                    task.get('radius') or 0.0)
+                        self.flown_pieces = {
+                            piece: row for piece, row in self.flown_pieces.items()
+                            if split_piece(piece)[0] != task['id']}
+                self.tasks[task['id']] = announced_task(
+                    task, known.wall if known else self._announced_at(line))
                 self.begun = min(self.begun, self.tasks[task['id']].wall)
 
     def _announced_at(self, line: Line) -> float:
@@ -178,6 +179,10 @@ class RunState:
         """The last status of each task, also of those that the allocator has forgotten."""
         return {**self.ended, **self.statuses}
 
+    def known_pieces(self) -> dict[str, ReportedStatus]:
+        """The last status of each piece, also of flown ones that the allocator has forgotten."""
+        return {**self.flown_pieces, **self.pieces}
+
     def _is_refused(self, task_id: str, action: str) -> bool:
         """Whether the allocator refuses an ADD or UPDATE of a task that it has, or had."""
         status = self.statuses.get(task_id)
@@ -202,6 +207,9 @@ class RunState:
                           if row.state in END_STATES or task not in rows)
         for task in rows.keys() & self.ended.keys():
             del self.ended[task]
+        before = {**self.flown_pieces, **self.pieces}
+        self.flown_pieces = {piece: row for piece, row in before.items()
+                             if row.state == 'COMPLETED' and piece not in rows}
         self.pieces = {task: row for task, row in rows.items() if split_piece(task)[1]}
         self.statuses = {task: row for task, row in rows.items() if task not in self.pieces}
 
