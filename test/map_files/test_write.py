@@ -15,6 +15,7 @@ from uav_task_alloc.record.ground_truth import TrueSample
 from uav_task_alloc.record.reported import AnnouncedTask
 from uav_task_alloc.record.run_state import RunState
 from uav_task_alloc.scenario.read import parse
+from uav_task_alloc.scenario.values import TASK_TIMES
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 SCENARIO = parse("""
@@ -22,8 +23,9 @@ origin: {latitude: 47.3977, longitude: 8.5456, altitude_amsl: 488}
 uavs: [{id: u1, position: [0, 0, 0]}, {id: u2, position: [9, 0, 0]}]
 tasks:
   - {id: a, position: [100, 200, 40], value: 2, service_time: 4}
-  - {id: b, position: [300, -50, 60]}
-  - {id: c, position: [-300, 50, 60]}
+  - {id: b, position: [300, -50, 60], earliest: 0, latest: 90.5}
+  - {id: c, position: [-300, 50, 60], payload: 1.5, release: 9,
+     required_capabilities: [lidar, camera]}
 zones:
   - {id: dome, shape: hemisphere, center: [200, 100, 10], radius: 30, margin: 2}
   - {id: wall, shape: polygon, vertices: [[0, 300], [50, 300], [50, 350]], z_max: 90}
@@ -47,6 +49,8 @@ def test_a_plan_that_is_imported_again_has_the_same_tasks_and_zones(map_file):
         assert after.task.position == pytest.approx(before.task.position, abs=0.01)
         assert (after.task.value, after.task.service_time) == (
             before.task.value, before.task.service_time)
+        for key in (*TASK_TIMES, 'required_capabilities'):
+            assert getattr(after.task, key) == getattr(before.task, key)
     dome, wall = (timed.zone for timed in again.zones)
     assert (dome.z_max, dome.margin, wall.z_max) == (40.0, 2.0, 90.0)
     assert all(30.0 <= ((x - 200) ** 2 + (y - 100) ** 2) ** 0.5 <= 30.1 for x, y in dome.vertices)
@@ -105,6 +109,11 @@ def test_the_map_of_a_flight_has_tracks_states_and_zones(tmp_path, capsys, suffi
     assert [(each.name, each.properties['kind']) for each in elements] == [
         ('a', 'task'), ('dome', 'zone'), ('u1', 'track')]
     assert elements[0].properties['state'] == 'no status'
+    run.apply({'kind': 'statuses', 'wall': 3.0, 'statuses': [
+        {'task': 'a', 'state': 'COMPLETED', 'uav': 'u1', 'reason': ''}]})
+    run.apply({'kind': 'statuses', 'wall': 4.0, 'statuses': []})  # forgotten
+    write_flown(out, run, tracks)
+    assert read_map_file(out).elements[0].properties['state'] == 'COMPLETED'
     assert [place.altitude for place in elements[2].places] == [488.0, 518.0]
 
 

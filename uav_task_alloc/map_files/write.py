@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.geometry.polygon import XY
-from uav_task_alloc.model import Plan, Point, Shape, ThreatZone
+from uav_task_alloc.model import Plan, Point, Shape, Task, ThreatZone
 from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import RED, STATE_COLOURS, uav_colour
 from uav_task_alloc.record.ground_truth import TrueSample
@@ -62,7 +62,8 @@ def plan_shapes(scenario: Scenario, plan: Plan) -> list[MapShape]:
         tasks.append(MapShape(
             task.id, 'tasks', 'LineString' if way else 'Point', way or (task.position,), {
                 'kind': 'task', 'altitude': task.position[2], 'value': task.value,
-                'service_time': task.service_time, **row}, _colours(scenario.uavs).get(uav, RED)))
+                'service_time': task.service_time, **_limits(task), **row},
+            _colours(scenario.uavs).get(uav, RED)))
     known = {timed.task.id: timed.task for timed in scenario.tasks}
     routes = [MapShape(uav.id, 'routes', 'LineString', tuple(points), {
         'kind': 'route', 'metres': round(plan.route(uav.id).distance, 1)},
@@ -70,6 +71,15 @@ def plan_shapes(scenario: Scenario, plan: Plan) -> list[MapShape]:
         for uav in scenario.uavs if len(points := route_points(uav.uav, plan, known)) > 1]
     return [*tasks, *_area_shapes(scenario.fence_area),
             *(zone_shape(timed.zone) for timed in scenario.zones), *routes]
+
+
+def _limits(task: Task) -> dict[str, Any]:
+    """Window, release, payload and capabilities of a task, by the keys of a scenario, if any."""
+    found = {'earliest': task.earliest, 'latest': task.latest, 'release': task.release or math.inf,
+             'payload': task.payload or math.inf}
+    names = ', '.join(sorted(task.required_capabilities))
+    return {**{key: value for key, value in found.items() if math.isfinite(value)},
+            **({'required_capabilities': names} if names else {})}
 
 
 def _area_shapes(corners: Sequence[XY]) -> list[MapShape]:
@@ -115,7 +125,7 @@ def flight_shapes(run: RunState, tracks: Mapping[str, Sequence[TrueSample]]) -> 
     """
     tasks = []
     for name, task in run.tasks.items():
-        status = run.statuses.get(name)
+        status = run.status(name)
         row = {'state': status.state, 'flown_by': status.uav} if status else {'state': 'no status'}
         tasks.append(MapShape(name, 'tasks', 'Point', (task.position,), {
             'kind': 'task', 'altitude': task.position[2], **row},
