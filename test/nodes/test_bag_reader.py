@@ -42,15 +42,15 @@ MESSAGES = [
     *(('/fleet/uav_states', state(k)) for k in range(5))]
 
 
-def write(path, messages, about=None, flush_every=2):
-    """A bag with a chunk for each two messages, 1 s apart."""
+def write(path, messages, about=None, flush_every=2, seconds=range(1000)):
+    """A bag with a chunk for each two messages, 1 s apart or at other `seconds`."""
     with Bag(path, about or {'speedup': '2.0'}) as bag:
         for k, (topic, message) in enumerate(messages):
             package, kind, _ = type(message).__module__.split('.')
             name = f'{package}/{kind}/{type(message).__name__}'
             if topic not in bag.channels:
                 bag.open(topic, name, definition(name))
-            when = 1_700_000_000_000_000_000 + k * 1_000_000_000
+            when = 1_700_000_000_000_000_000 + round(seconds[k] * 1e9)
             bag.add(topic, serialize_message(message), when, when - 5)
             if k % flush_every:
                 bag.flush()
@@ -227,3 +227,13 @@ def test_a_file_that_is_no_recording_is_refused_with_a_reason(tmp_path):
         report.main([str(tmp_path / 'other.mcap')])
     with pytest.raises(SystemExit, match=r'none\.mcap: No such file'):
         report.main([str(tmp_path / 'none.mcap')])
+
+
+def test_times_go_on_where_the_clock_of_the_recorder_went_back(tmp_path):
+    seconds = [5.0, 6.0, 5.9, -3590.0, -3589.0, -3589.1]  # messages out of order are no step
+    messages = [('/u1/task_list', m.TaskList(uav_id='u1', header=header(1.7e9 + at)))
+                for at in seconds]
+    lines = list(BagReader(write(tmp_path / 'back.mcap', messages, seconds=seconds)))[1:]
+    expected = [1.7e9 + at for at in (5.0, 6.0, 5.9, 6.0, 7.0, 6.9)]
+    assert [line['wall'] for line in lines] == pytest.approx(expected, abs=1e-3)
+    assert [line['stamp'] for line in lines] == pytest.approx(expected, abs=1e-3)

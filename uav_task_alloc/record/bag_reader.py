@@ -2,6 +2,7 @@
 """Reader of an MCAP file as the lines of a record, up to the first damage."""
 from __future__ import annotations
 
+import math
 import struct
 from collections import Counter
 from collections.abc import Callable, Container, Iterator
@@ -26,6 +27,9 @@ _ORIGIN, _LIST = _PACKAGE + 'FleetOrigin', _PACKAGE + 'TaskList'
 _ANNOUNCEMENT = _PACKAGE + 'TaskAnnouncement'
 _AREA, _AREA_TOPIC = 'geometry_msgs/msg/PolygonStamped', '/fence_area'
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+# [s] back that are a step of the recorder's clock; less are messages of several topics that were
+# written in another order than received
+_STEP_BACK = 2.0
 _MAX_RECORD_SIZE = 2**30  # [bytes]; a larger size is damage
 # by type, so that the names of the topics do not matter
 _BUILDERS: dict[str, Callable[[Any], message_records.RecordBody]] = {
@@ -74,6 +78,7 @@ class BagReader:
         self.unplaced: set[str] = set()
         self.origin: Origin | None = None
         self.origin_sought = False
+        self.newest, self.offset = -math.inf, 0.0  # [s]
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.decoders = DecoderFactory()
@@ -144,7 +149,19 @@ class BagReader:
         if body['kind'] == 'origin':
             self.origin = Origin(*(body[name] for name in (
                 'latitude', 'longitude', 'altitude_amsl')))
-        yield {'wall': message.log_time * 1e-9, **body}
+        wall = self.time(message.log_time * 1e-9)
+        yield {'wall': wall, **message_records.shifted(body, self.offset)}
+
+    def time(self, logged: float) -> float:
+        """The time of a line [unix s]: it goes on where the clock of the recorder went back.
+
+        Args:
+            logged: `log_time` of its message [s].
+        """
+        if logged + self.offset < self.newest - _STEP_BACK:
+            self.offset = self.newest - logged
+        self.newest = max(self.newest, logged + self.offset)
+        return logged + self.offset
 
     def announcement(self, msg: Any) -> message_records.RecordBody:
         """The record of a TaskAnnouncement, by the first origin of the file where none is known.
