@@ -45,6 +45,18 @@ def test_a_task_that_has_ended_moves_only_after_the_allocator_has_forgotten_it(s
     assert run.tasks['t1'].position == (900.0, 0.0, 50.0)
 
 
+@pytest.mark.parametrize('more', [{'work': 'AREA', 'path': []}, {'latest': 90.0}])
+def test_an_update_to_another_kind_or_to_a_time_that_has_passed_moves_nothing(more):
+    run = RunState()
+    announce(run, 'ADD', 100.0, 1.0)
+    status(run, 'ASSIGNED')
+    row = {'id': 't1', 'position': [900.0, 0.0, 50.0]}
+    for wall, change, east in ((100.0, more, 100.0), (101.0, {'latest': 200.0}, 900.0)):
+        run.apply({'kind': 'announcement', 'wall': wall, 'action': 'UPDATE',
+                   'tasks': [{**row, **change}]})
+        assert run.tasks['t1'].position[0] == east
+
+
 def zone_message(zone_id, margin):
     return SimpleNamespace(zone_id=zone_id, shape=1, center=SimpleNamespace(x=50.0, y=0.0, z=0.0),
                            radius=20.0, vertices=[], z_min=0.0, z_max=200.0, margin=margin)

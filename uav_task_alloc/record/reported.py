@@ -66,6 +66,28 @@ UNKNOWN_TASK = ReportedStatus(
     'journal; announce it again')
 
 
+def is_refused(known: AnnouncedTask, status: ReportedStatus, row: Line, action: str,
+               now: float) -> bool:
+    """Return whether an allocator refuses an announcement of a task, as far as that can be known.
+
+    Args:
+        known: the task as announced before.
+        status: of it.
+        row: of a line of kind `announcement`.
+        action: ADD or UPDATE.
+        now: clock of the allocator [ROS s].
+
+    Returns:
+        False also where the allocator refused the task before.
+    """
+    if status.state == 'REJECTED':
+        return False
+    latest = row.get('latest')
+    return (action == 'ADD' or status.state in ('COMPLETED', 'CANCELLED')
+            or bool(known.work) != bool(row.get('work'))  # it stays a point, or work
+            or (latest is not None and latest < now and latest != known.latest))
+
+
 @dataclass(frozen=True, slots=True)
 class SolveRecord:
     """One published plan: when, solve time, and what triggered it."""

@@ -31,6 +31,7 @@ from uav_task_alloc.record.reported import (
     SolveRecord,
     ZoneInterval,
     announced_task,
+    is_refused,
 )
 from uav_task_alloc.record.ways_home import WaysHome
 from uav_task_alloc.zone_codec import decode_zone
@@ -127,7 +128,9 @@ class RunState:
                 self.cancelled.add(task['id'])
             else:
                 known = self.tasks.get(task['id'])
-                if known and self._is_refused(task['id'], line['action']):
+                status = self.statuses.get(task['id'])
+                now = line['wall'] - self.allocators.lead.seconds
+                if known and status and is_refused(known, status, task, line['action'], now):
                     continue
                 if line['action'] == 'ADD':
                     self.cancelled.discard(task['id'])
@@ -182,13 +185,6 @@ class RunState:
     def known_pieces(self) -> dict[str, ReportedStatus]:
         """The last status of each piece, also of flown ones that the allocator has forgotten."""
         return {**self.flown_pieces, **self.pieces}
-
-    def _is_refused(self, task_id: str, action: str) -> bool:
-        """Whether the allocator refuses an ADD or UPDATE of a task that it has, or had."""
-        status = self.statuses.get(task_id)
-        if status is None or status.state == 'REJECTED':
-            return False
-        return action == 'ADD' or status.state in ('COMPLETED', 'CANCELLED')
 
     def on_statuses(self, line: Line) -> None:
         """The statuses of all tasks."""
