@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live page by keyboard and screen reader, with long names, and with UAVs that come later."""
 import pytest
-from chromium import wait
+from chromium import open_page, wait
 from small_run import BEGIN, FIRST, Run, announced, state, statuses
 
 LONG = 'mast_of_the_northern_line_' * 7
@@ -40,3 +40,9 @@ def test_the_focus_stays_on_a_task_where_a_list_with_it_changes(view):
     run.add(statuses(BEGIN + 1, t4='UNASSIGNED  too far', t5='UNASSIGNED  inside zone z1'))
     wait(page, '#left', 'inside zone z1')
     assert page.evaluate('document.activeElement.textContent') == 't5'
+
+
+def test_the_time_of_day_has_its_zone_as_reasons_are_in_utc(tab, serve):
+    page = tab(timezone_id='America/St_Johns')
+    open_page(page, serve(Run().add(*FIRST).snapshots).address)
+    wait(page, '#clock', '0:00 (04:30:00 GMT-3:30)')

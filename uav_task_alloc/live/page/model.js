@@ -21,7 +21,7 @@ export function span(seconds) {
 export const seconds = wall => (wall - live.clock.start) * live.clock.speedup;
 export const stamp = wall => span(seconds(wall));
 export const mission = wallSeconds => wallSeconds * live.clock.speedup;
-export const ofDay = wall => new Date(wall * 1000).toLocaleTimeString('en-GB');
+export const ofDay = (wall, zone = {}) => new Date(wall * 1000).toLocaleTimeString('en-GB', zone);
 
 export function some(names, most) {
   const more = names.length - most;

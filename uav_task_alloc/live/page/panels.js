@@ -56,7 +56,8 @@ export function showHead(model, past) {
   const done = model.ids.filter(id => stateOf(id, model)[0] === 'COMPLETED').length;
   const silent = model.uavs.filter(uav => uav.lost).length, {clock} = live;
   const replans = model.replans.filter(plan => !plan.first).length;
-  put($('clock'), `${model.ids.length ? stamp(model.wall) : '–'} (${ofDay(model.wall)})`);
+  put($('clock'), `${model.ids.length ? stamp(model.wall) : '–'} (${
+    ofDay(model.wall, {timeStyle: 'long'})})`);
   $('progress').max = model.ids.length || 1;
   $('progress').value = done;
   put($('counts'), model.uavs.length + model.ids.length === 0 ? 'waiting for UAVs and tasks'
