@@ -53,7 +53,7 @@ class TelemetryMessages:
 
     @property
     def _boot_ms(self) -> int:
-        return round((self._flight.now - self._flight.booted) * 1000.0)
+        return round((self._flight.now - self._flight.booted) * 1000.0) % 2**32
 
     def heartbeat(self) -> Message:
         flight = self._flight

@@ -4,7 +4,8 @@ import math
 import random
 
 import pytest
-from mission_bench import ORIGIN, PROFILES
+from flight_bench import FlightBench, places
+from mission_bench import ORIGIN, PROFILES, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.clock_rate import ClockRate
@@ -111,3 +112,40 @@ def test_another_restart_soon_after_one_is_seen(flying):
     for k in range(3):
         clocked(flying, 300 + 200 * k, 18.5 + 0.2 * k)
     assert flying.restarts == 2
+
+
+WRAP = 2**32  # [ms] after which a uint32 begins again at 0
+
+
+@pytest.mark.parametrize('silence', [0.2, 60.0, 7200.0])
+def test_a_clock_that_begins_again_after_49_7_days_shows_no_restart(silence):
+    telemetry = Telemetry(PROFILES['px4'], ORIGIN, 0.0)
+    for k in range(60):
+        clocked(telemetry, WRAP - 6000 + 100 * k, 0.1 * k)
+    for k in range(60):
+        clocked(telemetry, 1000.0 * silence + 200 * k - 100, 5.9 + silence + 0.2 * k)
+    clocked(telemetry, WRAP - 300, 7.0 + silence + 0.2 * 60)  # late
+    assert telemetry.restarts == 0
+    assert telemetry.boot_ms == pytest.approx(WRAP + 1000 * silence + 11700, abs=1)
+
+
+@pytest.mark.parametrize('age', [WRAP - 60_000, WRAP * 3 // 4])
+def test_a_restart_of_an_old_clock_is_seen(age):
+    telemetry = Telemetry(PROFILES['px4'], ORIGIN, 0.0)
+    for k in range(60):
+        clocked(telemetry, age + 100 * k, 0.1 * k)
+    for k in range(3):
+        clocked(telemetry, 500 + 200 * k, 6.0 + 0.2 * k)
+    assert telemetry.restarts == 1
+
+
+@pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+def test_a_flight_over_the_49th_day_of_its_clock_stays_with_the_bridge(kind):
+    bench = FlightBench(kind)
+    bench.vehicles[1].flight.booted = 60.0 - 1e-3 * WRAP
+    bench.discover()
+    bench.assign(task_list('ABCDEF'))
+    assert bench.run(lambda: bench.completed() == [*'ABCDEF'])
+    assert bench.now > 70.0
+    assert not any('restarted' in note or 'LOST' in note for note in bench.notes)
+    assert places(bench) == [*'ABCDEF']

@@ -11,6 +11,8 @@ _RESTART_STEP = 2000  # [ms] decrease of time_boot_ms that shows a restart, not 
 CLOCK_TIME = 3.0  # [s] in which a message with the clock comes, as a rule
 _MAX_DELAY = 6.0  # [s] of a late message
 _CATCH_UP = 1.0  # [s] in which a link delivers what it has buffered in a silence
+CLOCK_RANGE = 2**32  # [ms] after which `time_boot_ms` begins again at 0: 49.7 days
+_OFF = 10_000.0  # [ms] that it may be off the forecast where it begins again
 
 
 class BootClock:
@@ -20,7 +22,7 @@ class BootClock:
         now: steady time [s], as in all methods.
 
     Attributes:
-        boot_ms: the latest `time_boot_ms` [ms].
+        boot_ms: the latest `time_boot_ms` [ms], counted on where that begins again at 0.
         rate: of the clock.
     """
 
@@ -43,6 +45,22 @@ class BootClock:
         self.reset()
         self.boot_ms, self._at = boot_ms, now
 
+    def unwrapped(self, boot_ms: int, now: float) -> int:
+        """Return the `time_boot_ms` of a message, counted on where it has begun again at 0.
+
+        Args:
+            boot_ms: as received; one that was counted on already stays.
+            now: steady time of its reception [s].
+        """
+        rate, latest = self.rate.value, self.boot_ms
+        forecast = latest + 1000.0 * (1.0 if math.isnan(rate) else rate) * (now - self._at)
+        boot_ms = boot_ms % CLOCK_RANGE + latest // CLOCK_RANGE * CLOCK_RANGE
+        if latest and abs(boot_ms + CLOCK_RANGE - forecast) <= _OFF + 1e-3 * (forecast - latest):
+            return boot_ms + CLOCK_RANGE
+        if latest >= CLOCK_RANGE and boot_ms - forecast > CLOCK_RANGE // 2:
+            return boot_ms - CLOCK_RANGE  # late
+        return boot_ms
+
     def receive(self, boot_ms: int, now: float) -> float | None:
         """Take the clock of a message.
 
@@ -52,7 +70,7 @@ class BootClock:
         may deliver in order what it has buffered.
 
         Args:
-            boot_ms: `time_boot_ms` of the message.
+            boot_ms: `unwrapped` time of the message.
             now: steady time of its reception [s].
 
         Returns:
@@ -92,7 +110,7 @@ class BootClock:
         It would make the messages after it look like those after another restart.
 
         Args:
-            boot_ms: `time_boot_ms` of the message.
+            boot_ms: `unwrapped` time of the message.
             now: steady time of its reception [s].
         """
         return now - self._restarted_at < _MAX_DELAY and (

@@ -6,6 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction
 from uav_task_alloc.mavlink.gcs.authority_state import TaskMark
+from uav_task_alloc.mavlink.gcs.boot_clock import CLOCK_RANGE
 from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.resume import checksum
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
@@ -100,7 +101,8 @@ class MissionEvidence:
         if not self._telemetry.airborne:
             return ()
         return tuple(round(value, 3) for sample in self._onboard.progress.last_positions()
-                     for value in (sample.t, *sample.position, *sample.velocity))
+                     for value in (
+                         sample.t % (1e-3 * CLOCK_RANGE), *sample.position, *sample.velocity))
 
     def mission_position(self) -> tuple[int | None, int | None, bool]:
         """Checksum of the onboard mission, index of the item being flown, and whether it is there.

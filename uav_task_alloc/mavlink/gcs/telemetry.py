@@ -199,13 +199,19 @@ class Telemetry:
 
     def is_of_before_restart(self, message: Message, now: float) -> bool:
         """Whether a message was sent before a restart of the vehicle, and comes after it."""
-        boot = getattr(message, 'time_boot_ms', None)
+        boot = self._boot_time(message, now)
         return boot is not None and self._boot_clock.is_of_before(boot, now)
+
+    def _boot_time(self, message: Message, now: float) -> int | None:
+        """`time_boot_ms` of a message, changed in it to one that does not begin again at 0."""
+        if hasattr(message, 'time_boot_ms'):
+            message.time_boot_ms = self._boot_clock.unwrapped(message.time_boot_ms, now)
+        return getattr(message, 'time_boot_ms', None)
 
     def receive(self, message: Message, now: float) -> bool:
         """Process a message of this vehicle; False if a newer one of its type was received."""
         self.link.receive(now)
-        boot = getattr(message, 'time_boot_ms', None)
+        boot = self._boot_time(message, now)
         if boot is not None:  # first, as a restart begins other frame numbers
             booted_at = self._boot_clock.receive(boot, now)
             if booted_at is not None:
