@@ -90,9 +90,16 @@ def test_a_home_at_0_0_is_none(kind):
      'lat = 2147483647: expected a number in [-900000000, 900000000]'),
     (d.MAVLink_home_position_message(0, -2**31, 0, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0),
      'longitude = -2147483648: expected a number in [-1800000000, 1800000000]'),
+    (d.MAVLink_global_position_int_message(0, 47 * 10**7, 8 * 10**7, 2**31 - 1, 0, 0, 0, 0, 0),
+     'alt = 2147483647: expected a number in [-100000000, 100000000]'),
+    (d.MAVLink_global_position_int_message(0, 47 * 10**7, 8 * 10**7, 0, 2**31 - 1, 0, 0, 0, 0),
+     'relative_alt = 2147483647: expected a number in [-100000000, 100000000]'),
+    (d.MAVLink_home_position_message(
+        47 * 10**7, 8 * 10**7, 2**31 - 1, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0),
+     'altitude = 2147483647: expected a number in [-100000000, 100000000]'),
     (d.MAVLink_sys_status_message(0, 0, 0, 0, 0, 0, 127, 0, 0, 0, 0, 0, 0),
      'battery_remaining = 127: expected a number in [-128, 100]'),
-], ids=['latitude', 'longitude', 'battery'])
+], ids=['latitude', 'longitude', 'altitude', 'height', 'altitude of home', 'battery'])
 def test_finding_10_a_field_out_of_range_changes_nothing(message, words):
     bench = FlightBench('px4').discover()
     bench.run(limit=10.0)

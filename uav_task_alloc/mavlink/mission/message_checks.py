@@ -9,12 +9,16 @@ from uav_task_alloc.mavlink.mission.items import GLOBAL_FRAMES
 from uav_task_alloc.mavlink.transport.codec import Message
 
 _MAX_LATITUDE, _MAX_LONGITUDE = 90 * 10**7, 180 * 10**7  # [1e-7 deg]
+_MAX_ALTITUDE = 10**8  # [mm], up and down: INT32_MAX is sent where it is not known
 # message -> field, least, most
 _RANGES: dict[str, tuple[tuple[str, int, int], ...]] = {
     'GLOBAL_POSITION_INT': (('lat', -_MAX_LATITUDE, _MAX_LATITUDE),
-                            ('lon', -_MAX_LONGITUDE, _MAX_LONGITUDE)),
+                            ('lon', -_MAX_LONGITUDE, _MAX_LONGITUDE),
+                            ('alt', -_MAX_ALTITUDE, _MAX_ALTITUDE),
+                            ('relative_alt', -_MAX_ALTITUDE, _MAX_ALTITUDE)),
     'HOME_POSITION': (('latitude', -_MAX_LATITUDE, _MAX_LATITUDE),
-                      ('longitude', -_MAX_LONGITUDE, _MAX_LONGITUDE)),
+                      ('longitude', -_MAX_LONGITUDE, _MAX_LONGITUDE),
+                      ('altitude', -_MAX_ALTITUDE, _MAX_ALTITUDE)),
     'BATTERY_STATUS': (('battery_remaining', -128, 100),),  # below 0: not known
     'SYS_STATUS': (('battery_remaining', -128, 100),),
 }
