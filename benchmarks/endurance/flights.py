@@ -3,7 +3,8 @@
 
     python benchmarks/endurance/flights.py --flights 2000 --seed 1 [--lossy] [--json]
 
-Each flight is one simulated ArduCopter or PX4 and one bridge over a link in virtual time; --lossy
+Each flight is one simulated ArduCopter or PX4, of which every other one reports its
+mission_state, and one bridge over a link in virtual time; --lossy
 loses up to 20 % of the frames and delays some by up to 5 s, out of order. Judged by the records
 of the simulator and the link. `flyable` counts the tasks of flights at whose end the bridge
 controls the aircraft, `completed` those of them that it reported. `flown_twice` counts the tasks
@@ -60,7 +61,8 @@ class Flight:
                    relaunch=rng.choice(['operator', 'automatic'])),
             arming_delay=rng.uniform(0.0, 5.0) + 10.0 * boots,
             boot_delay=None if boots else 0.0, settling_time=None if boots else 0.0,
-            batteries=rng.choice([1, 2]))
+            batteries=rng.choice([1, 2]),
+            reports_mission_state=random.Random(f'{seed}/{number}/state').random() < 0.5)
         self.places = {f't{k}': (SIDE * (k % 5) + rng.uniform(-9.0, 9.0),
                                  SIDE * (1 + k // 5) + rng.uniform(-9.0, 9.0),
                                  rng.uniform(25.0, 45.0)) for k in range(20)}

@@ -19,6 +19,8 @@ from uav_task_alloc.sim.vehicle import AUTOPILOTS, Vehicle
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 OURS, TICK = (245, 190), 0.05  # [s]
 PROFILES = {'ardupilot': ARDUPILOT, 'px4': PX4}
+# configs of vehicles of which a PX4 reports its mission_state
+REPORTS_STATE = {n: {'reports_mission_state': True} for n in (1, 2)}
 
 
 def square(n, side=100.0, z=50.0):

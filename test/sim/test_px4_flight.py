@@ -16,6 +16,12 @@ def bench():
     return Bench('px4')
 
 
+@pytest.fixture
+def newer():
+    """A PX4 that reports its mission_state."""
+    return Bench('px4', reports_mission_state=True)
+
+
 def current(bench):
     return of(bench.pass_time(1.1), 'MISSION_CURRENT')[-1]
 
@@ -119,25 +125,33 @@ def test_reached_is_not_sent_for_a_return_item(bench):
     assert set(reached(bench.received)) == {0}
 
 
-def test_at_the_end_it_goes_to_hold_with_mission_state_5(bench):
+def test_at_the_end_it_goes_to_hold_with_mission_state_5(newer):
+    newer.fly(waypoint(A))
+    assert current(newer).mission_state == d.MISSION_STATE_ACTIVE
+    newer.reach(0)
+    assert newer.flight.mode is FlightMode.HOLD
+    assert current(newer).mission_state == d.MISSION_STATE_COMPLETE
+
+
+def test_px4_1_15_reports_no_mission_state(bench):
     bench.fly(waypoint(A))
-    assert current(bench).mission_state == d.MISSION_STATE_ACTIVE
+    assert (current(bench).mission_state, current(bench).mission_mode) == (0, 0)
     bench.reach(0)
     assert bench.flight.mode is FlightMode.HOLD
-    assert current(bench).mission_state == d.MISSION_STATE_COMPLETE
+    assert (current(bench).mission_state, current(bench).mission_mode) == (0, 0)
 
 
-def test_a_mission_that_has_ended_is_not_begun_again_in_the_air(bench):
-    bench.fly(waypoint(A), waypoint(B))
-    bench.reach(1)
-    bench.received.clear()
-    assert bench.set_mode(FlightMode.MISSION) == d.MAV_RESULT_ACCEPTED
-    assert bench.texts() == ['No valid mission available, loitering']
-    assert bench.flight.mode is FlightMode.HOLD
-    assert current(bench).mission_state == d.MISSION_STATE_COMPLETE
-    bench.set_current(0)
-    bench.set_mode(FlightMode.MISSION)
-    bench.reach(0)
+def test_a_mission_that_has_ended_is_not_begun_again_in_the_air(newer):
+    newer.fly(waypoint(A), waypoint(B))
+    newer.reach(1)
+    newer.received.clear()
+    assert newer.set_mode(FlightMode.MISSION) == d.MAV_RESULT_ACCEPTED
+    assert newer.texts() == ['No valid mission available, loitering']
+    assert newer.flight.mode is FlightMode.HOLD
+    assert current(newer).mission_state == d.MISSION_STATE_COMPLETE
+    newer.set_current(0)
+    newer.set_mode(FlightMode.MISSION)
+    newer.reach(0)
 
 
 @pytest.mark.parametrize('flown', [1, 2])
@@ -195,14 +209,14 @@ def test_a_mission_loaded_on_the_ground_begins_at_its_last_item_where_that_is_cu
     assert current(bench).seq == 1
 
 
-def test_after_a_take_off_it_reports_that_its_mission_is_complete(bench):
-    bench.load(waypoint(A), waypoint(B))
-    assert current(bench).mission_state == d.MISSION_STATE_NOT_STARTED
-    bench.rise()
-    bench.until(lambda: bench.flight.mode is FlightMode.HOLD)
-    assert current(bench).mission_state == d.MISSION_STATE_COMPLETE
-    bench.set_mode(FlightMode.MISSION)
-    assert current(bench).mission_state == d.MISSION_STATE_ACTIVE
+def test_after_a_take_off_it_reports_that_its_mission_is_complete(newer):
+    newer.load(waypoint(A), waypoint(B))
+    assert current(newer).mission_state == d.MISSION_STATE_NOT_STARTED
+    newer.rise()
+    newer.until(lambda: newer.flight.mode is FlightMode.HOLD)
+    assert current(newer).mission_state == d.MISSION_STATE_COMPLETE
+    newer.set_mode(FlightMode.MISSION)
+    assert current(newer).mission_state == d.MISSION_STATE_ACTIVE
 
 
 def test_without_param2_a_waypoint_is_reached_10_m_before_it():

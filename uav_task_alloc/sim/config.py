@@ -40,6 +40,8 @@ class VehicleConfig:
     current_sensors: int = 2  # number of batteries, the first ones, whose current is measured
     capacity: int | None = None  # items of the mission storage
     floods: bool = True  # PX4 streams its onboard set unasked
+    # PX4 sends mission_state and mission_mode: not 1.15 and before, whose are always 0
+    reports_mission_state: bool = False
     fence_capacity: int | None = None  # points of the fence store; 0: none at all
     parameters: tuple[tuple[str, float], ...] = ()  # those that differ from the defaults
 

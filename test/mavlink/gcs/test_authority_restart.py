@@ -22,7 +22,7 @@ from authority_bench import (
 )
 from findings_bench import set_current
 from flight_bench import places
-from mission_bench import task_list
+from mission_bench import REPORTS_STATE, task_list
 
 from uav_task_alloc.mavlink.gcs.authority import Suspension
 
@@ -355,7 +355,7 @@ def test_a_climb_that_a_pilot_ends_below_its_height_is_a_loss(kind):
 
 @PX4
 def test_a_mission_that_ended_while_no_bridge_ran_leaves_it_held(kind):
-    bench = flying(kind, 'AB')
+    bench = flying(kind, 'AB', configs=REPORTS_STATE)
     bench.kill_and_restart(60.0)
     bench.assign(task_list('ABC', 2))
     assert bench.reaches(H, 5.0)

@@ -2,7 +2,7 @@
 """A bridge killed before or after any write to its state_dir: no task is lost or flown twice."""
 import pytest
 from flight_bench import FlightBench, Store, places
-from mission_bench import task_list
+from mission_bench import REPORTS_STATE, task_list
 
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
@@ -43,10 +43,11 @@ def progress_of(record):
 class KilledBench(FlightBench):
     """A bridge that is started again when it was killed, and an allocator that shortens lists."""
 
-    def __init__(self, kind, write, before, down, service):
+    def __init__(self, kind, write, before, down, service, reports=True):
         self.killed, self.down, self.service = False, down, service
         self.done, self.listed, self.revision = [], None, 0
-        super().__init__(kind, store=KillingStore(write, before), delay=(0.02, 0.02))
+        super().__init__(kind, store=KillingStore(write, before), delay=(0.02, 0.02),
+                         configs=REPORTS_STATE if reports else None)
 
     def guard(self, call):
         """Call the bridge; what it has not published when it is killed is lost."""
@@ -104,6 +105,14 @@ def test_killed_at_any_write_each_task_is_flown_once_and_reported(kind, before, 
             lambda write: KilledBench(kind, write, before, down, service)):
         assert bench.fly() == list(NAMES), f'write {write}'
     assert write > len(NAMES)
+
+
+@pytest.mark.parametrize('down', [0.0, 15.0])
+def test_killed_at_any_write_each_task_of_a_px4_without_a_mission_state_is_reported(down):
+    for write, bench in killed_at_each_write(
+            lambda write: KilledBench('px4', write, False, down, 3.0, reports=False)):
+        flown = bench.fly()  # the last one again where its end came in the silence
+        assert flown in (['A', 'B', 'C'], ['A', 'B', 'C', 'C']), f'write {write}'
 
 
 class TurnedBench(KilledBench):

@@ -5,7 +5,7 @@ import math
 import pytest
 from authority_bench import MODES, flying as authority_flying
 from flight_bench import FlightBench, flying, places
-from mission_bench import task_list
+from mission_bench import REPORTS_STATE, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.sim.config import FlightMode
@@ -13,7 +13,7 @@ from uav_task_alloc.sim.config import FlightMode
 
 def taken_off(names):
     """Over its home in Hold, with the list on board."""
-    bench = FlightBench('px4')
+    bench = FlightBench('px4', configs=REPORTS_STATE)
     bench.discover()
     bench.assign(task_list(names))
     vehicle = bench.vehicles[1]
@@ -35,7 +35,7 @@ def test_a_restarted_bridge_after_a_take_off_completes_no_task_before_it_is_flow
 
 
 def test_a_restarted_bridge_after_a_landing_completes_no_task():
-    bench = flying('px4', 'ABC')
+    bench = flying('px4', 'ABC', configs=REPORTS_STATE)
     vehicle = bench.vehicles[1]
     assert bench.run(lambda: bench.completed() == ['A'])
     vehicle.flight.set_mode(FlightMode.LAND)
@@ -64,7 +64,7 @@ def test_complete_left_over_from_the_take_off_ends_no_list_of_one_task():
 
 
 def test_the_last_task_is_complete_by_the_end_where_its_reached_is_lost_and_a_cut_follows():
-    bench = flying('px4', 'AB')
+    bench = flying('px4', 'AB', configs=REPORTS_STATE)
     vehicle, ended = bench.vehicles[1], []
 
     def tamper(direction, message, now):
@@ -87,7 +87,7 @@ def test_the_last_task_is_complete_by_the_end_where_its_reached_is_lost_and_a_cu
 
 
 def test_a_take_off_after_a_landing_is_no_flight_in_which_the_mission_can_have_ended():
-    bench = authority_flying('px4', 'A')
+    bench = authority_flying('px4', 'A', configs=REPORTS_STATE)
     vehicle, telemetry = bench.vehicles[1], bench.executor().telemetry
     assert telemetry.airborne_since_mission
     vehicle.failsafe('ekf', MODES['px4'].land)
@@ -103,7 +103,7 @@ def test_a_take_off_after_a_landing_is_no_flight_in_which_the_mission_can_have_e
 
 @pytest.mark.parametrize('wait', [3.8, 3.9])
 def test_a_landing_just_before_the_end_of_a_service_completes_no_task(wait):
-    bench = flying('px4', 'A', service=4.0)
+    bench = flying('px4', 'A', service=4.0, configs=REPORTS_STATE)
     vehicle = bench.vehicles[1]
     body, (x, y, _) = vehicle.flight.body, task_list('A').stops[0].task.position
     assert bench.run(lambda: math.dist(body.position[:2], (x, y)) < 2.0)

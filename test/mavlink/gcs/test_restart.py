@@ -9,7 +9,7 @@ import pytest
 from authority_bench import MODES, flying as flying_held
 from findings_bench import distance, drop_messages, flown_once_each
 from flight_bench import FlightBench, flying, places
-from mission_bench import task_list
+from mission_bench import REPORTS_STATE, task_list
 
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.status import UavMode
@@ -89,7 +89,7 @@ def hand_over_in_hold(bench, n=1):
 @BOTH
 @pytest.mark.parametrize('first', ['', 'X'])
 def test_a_task_flown_while_no_bridge_ran_is_known_after_a_list_without_it(kind, first):
-    bench = flying(kind, 'ABC')
+    bench = flying(kind, 'ABC', configs=REPORTS_STATE)
     bench.run(limit=1.5)  # a heartbeat has shown the mission mode
     dead_until(bench, 3)
     bench.assign(task_list(first, 2))  # the allocator has withdrawn the tasks meanwhile
@@ -141,7 +141,7 @@ def test_positions_lost_before_the_restart_do_not_count_as_the_time_without_a_br
 
 @pytest.mark.parametrize('kinds', [('ardupilot', 'px4'), ('px4', 'ardupilot')])
 def test_a_task_flown_while_no_bridge_ran_is_not_flown_by_another_uav(kinds):
-    bench = FlightBench(*kinds).discover()
+    bench = FlightBench(*kinds, configs=REPORTS_STATE).discover()
     bench.assign(task_list('ABC', service=1.0))
     bench.assign(task_list('X'), 2)
     assert bench.run(lambda: bench.started() == ['A'] and bench.started(2) == ['X'])
@@ -163,7 +163,7 @@ def test_a_task_flown_while_no_bridge_ran_is_not_flown_by_another_uav(kinds):
     (60.0, 'CBDA', False)])  # its mission cannot be read
 def test_a_uav_waits_for_the_mission_of_the_one_that_may_have_flown_its_tasks(
         kinds, unread, tasks, waits):
-    bench = FlightBench(*kinds).discover()
+    bench = FlightBench(*kinds, configs=REPORTS_STATE).discover()
     bench.assign(task_list('ABC', service=1.0))
     bench.assign(task_list('X'), 2)
     assert bench.run(lambda: bench.started() == ['A'] and bench.started(2) == ['X'])
@@ -269,7 +269,8 @@ class RandomAllocator:
 def test_killed_at_random_and_reassigned_each_task_is_flown_once(kind, seed):
     rng = random.Random(seed)
     other = {'ardupilot': 'px4', 'px4': 'ardupilot'}[kind]
-    bench = FlightBench(kind, other, seed=seed, delay=(0.02, 0.02)).discover()
+    bench = FlightBench(kind, other, seed=seed, delay=(0.02, 0.02), configs=REPORTS_STATE)
+    bench.discover()
     allocator = RandomAllocator(bench, 'ABCDEFGH', rng)
     allocator.assign()
     for _ in range(3):

@@ -5,7 +5,7 @@ from authority_bench import BOTH, MODES, PX4, H, L, S, flying, sends_no_command,
 from evidence_bench import SPEED, Flight
 from findings_bench import distance, drop_messages, flown_once_each, set_current
 from flight_bench import Store, places
-from mission_bench import ORIGIN, task_list
+from mission_bench import ORIGIN, REPORTS_STATE, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE
@@ -217,7 +217,7 @@ def test_a_reboot_before_a_service_is_over_completes_nothing(seconds, shown, com
 
 
 def test_the_end_of_a_mission_in_silence_is_known_when_the_link_is_back():
-    bench = flying('px4', 'AB')
+    bench = flying('px4', 'AB', configs=REPORTS_STATE)
     assert bench.run(lambda: len(bench.completed()) == 1)
     assert bench.run(lambda: distance(bench, (100.0, 100.0, 50.0)) < 15.0)
     bench.line.cut = True

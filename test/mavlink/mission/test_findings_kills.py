@@ -7,7 +7,7 @@ from authority_bench import ARDUPILOT, BOTH, MODES, PX4, flying
 from evidence_bench import Flight
 from findings_bench import distance, drop_messages, flown_once_each, happened, set_current
 from flight_bench import places
-from mission_bench import task_list
+from mission_bench import REPORTS_STATE, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction
@@ -148,7 +148,7 @@ def test_an_end_reported_just_before_a_reboot_counts_where_it_comes_after_it(
 @PX4
 @pytest.mark.parametrize('reported', [True, False])
 def test_an_end_reported_just_before_a_reboot_counts_where_no_reached_came(kind, reported):
-    bench = flying(kind, 'AB')
+    bench = flying(kind, 'AB', configs=REPORTS_STATE)
     assert bench.run(lambda: bench.completed() == ['A'])
     drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: True)
     drop_messages(bench, 'down', 'MISSION_CURRENT', lambda m: not reported and (

@@ -133,10 +133,10 @@ class ListExecution:
             return []
         if self._telemetry.mode is ModeFunction.TAKEOFF:
             return sender.wait_for('the end of the take-off')
-        if onboard.set_current_to is None and not (
-                flying or self._current_set or self._profile.atomic):
+        if onboard.set_current_to is None and not (flying or self._current_set) and (
+                not self._profile.atomic or self._may_have_ended()):
             # ArduPilot resumes after the item that it flew last
-            if self._current_unreported(now):
+            if not self._profile.atomic and self._current_unreported(now):
                 return sender.wait_for('the current item since the hold')
             onboard.set_current_to = onboard.progress.current
         if onboard.set_current_to is not None:
@@ -144,6 +144,16 @@ class ListExecution:
                 MissionDiff(DiffKind.JUMP, onboard.progress.items, onboard.set_current_to), now
             )
         return sender.set_mode(ModeFunction.MISSION, now)
+
+    def _may_have_ended(self) -> bool:
+        """Whether its mission may have ended in a silence (a PX4 that does not report that).
+
+        A complete mission is not flown on, and Hold is entered again, until its item is set.
+        """
+        telemetry, progress = self._telemetry, self._onboard.progress
+        last = len(progress.items) - 1
+        return (telemetry.airborne and telemetry.mission_state == d.MISSION_STATE_UNKNOWN
+                and telemetry.current == progress.current == last)
 
     def _current_unreported(self, now: float) -> bool:
         """Whether no current item came since the mode has just changed in the air."""

@@ -69,11 +69,14 @@ class Px4MissionServer(MissionServer):
         return self._id
 
     def progress(self) -> tuple[int, int, int]:
+        total = len(self.items) or 65535
+        if not self.flight.config.reports_mission_state:
+            return total, dialect.MISSION_STATE_UNKNOWN, 0
         runs = self.flight.mode in (FlightMode.MISSION, FlightMode.TAKEOFF, FlightMode.LAND)
-        return len(self.items) or 65535, self._update_mission_state(runs), 1 if runs else 2
+        return total, self._update_mission_state(runs), 1 if runs else 2
 
     def _update_mission_state(self, runs: bool) -> int:
-        """MISSION_STATE as PX4 sends it: also complete after a take-off or a landing."""
+        """MISSION_STATE as a newer PX4 sends it: also complete after a take-off or a landing."""
         result = self.flight.result
         if not self.items or not self.flight.feasible:
             self._mission_state = dialect.MISSION_STATE_NO_MISSION
