@@ -150,7 +150,8 @@ class Judge:
                 place, self.world.vehicle.flight.body.position) < NEAR)
         if self._forgot and self.world.arrivals:  # what the first heartbeat shows
             self._forgot = False
-            if self.world.vehicle.flight.landed:
+            flight = self.world.vehicle.flight
+            if flight.landed or not flight.armed:  # it falls after a reboot in the air
                 self.taken_at = self.known_at = None
         if self.taken_at is not None:
             self._news |= any(sent > self.taken_at + 1e-6 for sent in self.world.arrivals)
