@@ -55,3 +55,28 @@ def test_each_task_has_a_line_when_it_is_accepted_refused_started_and_done():
         ('info', "task 't1' completed by a"),
         ('warning', "task 't2' failed on a: blocked: it is FAILED"),
         ('info', "task 't3' cancelled")]
+
+
+def test_an_announcement_that_is_repeated_has_a_line_in_a_minute():
+    driver = fleet()
+    said = len(driver.notes)
+
+    def announce():
+        driver.add(('t4', 300, 0))  # as it is
+        driver.add(('t4', 9, 9))  # another one
+        driver.world.refuse('bad id', 'why', driver.now)
+        driver.cancel('unknown')
+        driver.settle()
+        return [note for note in driver.notes[said:] if 'plan ' not in note]
+
+    announce()
+    lines = announce()
+    assert lines == [
+        "task 't4' accepted", "ADD of task 't4' REJECTED: duplicate id: another task was announced"
+        ' under it', "task 'bad id' REJECTED: why",
+        "CANCEL of task 'unknown' REJECTED: unknown task: nothing to cancel",
+        'ADD of t4 ignored: duplicate: announced before, unchanged']
+    driver.now += 1.0
+    assert announce() == lines
+    driver.now += 60.0
+    assert len(announce()) == len(lines) + 4

@@ -204,8 +204,7 @@ class AllocatorNode(Node):
             refusal = self.world.event(to_event(msg), self.stamp(), time.monotonic())
         except InvalidValue as error:
             refusal = str(error)
-        if refusal:
-            self.get_logger().warning(f'task_events: {refusal}: ignored')
+        self.refusals.report('task_events', msg.task_id, refusal)
         self.save()
 
     def on_submit(self, request: SubmitTasks.Request,

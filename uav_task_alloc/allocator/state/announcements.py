@@ -2,6 +2,7 @@
 """Announcements: points go to the task registry, work of other kinds to the works; and the log."""
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from uav_task_alloc.allocator.records import (
@@ -23,6 +24,9 @@ from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.model import Task
 from uav_task_alloc.terrain import TerrainError
 from uav_task_alloc.work.pieces import Work
+
+_REPEATED = 60.0  # [s] in which a line that is repeated is left out
+_MOST_LINES = 1000  # that are remembered for it
 
 
 class Announcements:
@@ -53,6 +57,7 @@ class Announcements:
         self._ground = ground
         self._note, self._request_replan = note, request_replan
         self.recut_why, self.seen = recut_why, seen or SeenTasks()
+        self._written: dict[str, float] = {}  # lines of what changed nothing, and their times [s]
 
     def apply(self, action: AnnouncementAction, items: Iterable[Task | Work], stamp: float,
               now: float) -> list[TaskVerdict]:
@@ -74,17 +79,17 @@ class Announcements:
                     self._tasks.add if add else self._tasks.update)(item, stamp))
             if add and verdicts[-1].accepted and not verdicts[-1].unchanged:
                 self.seen.add(item, stamp)
-        return self._logged(action, verdicts, now)
+        return self._logged(action, verdicts, stamp, now)
 
     def cancel(self, task_ids: Iterable[str], stamp: float, now: float) -> list[TaskVerdict]:
         """Withdraw tasks; returns a verdict for each."""
         return self._logged(AnnouncementAction.CANCEL, [
             (self._works if task_id in self._works.records else self._tasks).cancel(task_id, stamp)
-            for task_id in task_ids], now)
+            for task_id in task_ids], stamp, now)
 
     def refuse(self, task_id: str, reason: str, stamp: float) -> TaskVerdict:
         """Refuse an invalid task; its status is REJECTED unless an accepted task has that id."""
-        self._note(f'task {task_id!r} REJECTED: {reason}', True)
+        self._note_once(f'task {task_id!r} REJECTED: {reason}', True, stamp)
         if task_id in self._works.records:
             return TaskVerdict(task_id, False, reason)
         return self._tasks.reject(task_id, reason, stamp)
@@ -134,10 +139,23 @@ class Announcements:
         return f'{task_id} is {state.name}' if state in (
             TaskState.COMPLETED, TaskState.CANCELLED) else ''
 
-    def _logged(self, action: AnnouncementAction, verdicts: list[TaskVerdict],
+    def _note_once(self, text: str, warning: bool, stamp: float) -> None:
+        """Log what changed nothing; an announcer may repeat it many times a second."""
+        if 0.0 <= stamp - self._written.get(text, math.inf) < _REPEATED:
+            return
+        self._note(text, warning)
+        self._written.pop(text, None)
+        self._written[text] = stamp
+        if len(self._written) > _MOST_LINES:
+            del self._written[next(iter(self._written))]
+
+    def _logged(self, action: AnnouncementAction, verdicts: list[TaskVerdict], stamp: float,
                 now: float) -> list[TaskVerdict]:
-        for text, warning in verdict_texts(action, verdicts):
-            self._note(text, warning)
+        for text, warning, changed in verdict_texts(action, verdicts):
+            if changed:
+                self._note(text, warning)
+            else:
+                self._note_once(text, warning, stamp)
         for verdict in verdicts:
             if verdict.accepted and not verdict.unchanged:
                 self._request_replan(f'{action.name} {verdict.task_id}', now)

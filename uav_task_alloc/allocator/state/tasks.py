@@ -184,7 +184,7 @@ def without_failed(record: TaskRecord, usable: frozenset[str]) -> Task:
 
 
 def verdict_texts(action: AnnouncementAction,
-                  verdicts: Sequence[TaskVerdict]) -> Iterator[tuple[str, bool]]:
+                  verdicts: Sequence[TaskVerdict]) -> Iterator[tuple[str, bool, bool]]:
     """The lines of the log about an announcement.
 
     Args:
@@ -192,15 +192,16 @@ def verdict_texts(action: AnnouncementAction,
         verdicts: one for each task.
 
     Yields:
-        Text, and whether it is a warning.
+        Text, whether it is a warning, and whether something has changed.
     """
     repeated = [verdict.task_id for verdict in verdicts if verdict.unchanged]
     if repeated:
-        yield f'{action.name} of {first_of(repeated)} ignored: {UNCHANGED}', False
+        yield f'{action.name} of {first_of(repeated)} ignored: {UNCHANGED}', False, False
     done = {AnnouncementAction.ADD: 'accepted', AnnouncementAction.UPDATE: 'updated',
             AnnouncementAction.CANCEL: 'cancelled'}[action]
     for verdict in verdicts:
         if not verdict.accepted:
-            yield (f'{action.name} of task {verdict.task_id!r} REJECTED: {verdict.reason}', True)
+            yield (f'{action.name} of task {verdict.task_id!r} REJECTED: {verdict.reason}', True,
+                   False)
         elif not verdict.unchanged:
-            yield f'task {verdict.task_id!r} {done}', False
+            yield f'task {verdict.task_id!r} {done}', False, True

@@ -122,8 +122,9 @@ class World:
     def announce(self, action: AnnouncementAction, tasks: Iterable[Task | Work], stamp: float,
                  now: float) -> list[TaskVerdict]:
         """ADD or UPDATE tasks; returns a verdict for each."""
-        self.outbox.statuses = True
-        return self.announced.apply(action, tasks, stamp, now)
+        verdicts = self.announced.apply(action, tasks, stamp, now)
+        self.outbox.statuses |= any(not verdict.unchanged for verdict in verdicts)
+        return verdicts
 
     def cancel(self, task_ids: Iterable[str], stamp: float, now: float) -> list[TaskVerdict]:
         """Withdraw tasks; returns a verdict for each."""
