@@ -82,7 +82,8 @@ class Allocator:
         self._clock: tuple[float, float] | None = None  # published and steady [s], last tick
         self._publisher = PlanPublisher(self.world, self._best, now)
         # UAVs of the journal get time to report before they lose their tasks
-        self._awaited = {each.uav for each in saved.lists if each.stops}
+        proposed = saved.proposal.lists if saved.proposal else ()
+        self._awaited = {each.uav for each in (*saved.lists, *proposed) if each.stops}
         self._wait_until = now + params.uav_timeout
         self._restarted = bool(saved.lists)
         self._hold_until = now + _RESTART_HOLD

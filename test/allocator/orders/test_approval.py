@@ -207,6 +207,26 @@ def test_an_open_proposal_outlives_a_restart_and_is_applied_once(driver):
     assert restored_state(again.core.rows()).proposal is None
 
 
+def test_the_first_proposal_of_a_fleet_waits_after_a_restart_until_its_uavs_report():
+    driver = make('all')
+    driver.add(('t1', 100, 0), ('t2', 900, 0))
+    driver.settle()
+    driver.core.nothing_written()
+    again = AllocatorDriver(restored_state(driver.core.rows()), plan, approval='all',
+                            uav_timeout=5.0)
+    revision = again.world.proposal.revision
+    again.settle(wait=1.0)
+    assert again.core.awaited(again.now) == ['a', 'b']
+    again.uav('a', 0.0, 0.0, 50.0)
+    again.settle(wait=1.0)
+    again.uav('b', 1000.0, 0.0, 50.0)
+    again.settle(wait=4.0)
+    assert again.world.proposal.revision == revision
+    assert again.desk().approve(revision, True, 'ann', False, again.now, again.now).success
+    again.settle()
+    assert (again.route('a'), again.route('b')) == (('t1',), ('t2',))
+
+
 def test_a_proposal_is_not_accepted_before_its_uavs_have_reported(driver):
     driver.add(('t4', 300, 0))
     driver.settle()
