@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 
 from uav_task_alloc.allocator.battery_watch import BatteryWatch
 from uav_task_alloc.allocator.giving_way import GivingWay
@@ -213,8 +214,12 @@ class Allocator:
             return why
         self.approvals.accept(operator)
         chosen = plan_of_lists(world, built.lists.values())
+        planned = {*chain(*(each.task_ids for each in built.lists.values()),
+                          *chain(*built.later.values()))}  # these wait no more
+        left_out = {**self._publisher.left_out, **built.left_out}
         self._publisher.put(replace(built, left_out={
-            **self._publisher.left_out, **built.left_out}), chosen, now, stamp)
+            task_id: reason for task_id, reason in left_out.items() if task_id not in planned}),
+            chosen, now, stamp)
         self._publisher.allocate(chosen, f'plan {proposal.revision} accepted by '
                                  f'{operator or "its deadline"}', stamp)
         return ''

@@ -42,6 +42,7 @@ def test_the_first_tasks_of_a_uav_need_approval_only_with_all(driver):
     decide(driver, accept=True)
     assert driver.route('a') == ('t1',)
     assert driver.allocations[-1].trigger == 'plan 1 accepted by ann'
+    assert driver.allocations[-1].plan.unassigned == {}
 
 
 @pytest.mark.parametrize('route_end', ['hold', 'home'])
