@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from uav_task_alloc_msgs import msg as m, srv
 
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
@@ -16,6 +17,7 @@ from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, ST
 pytestmark = pytest.mark.ros
 POLICIES = ElementTree.parse(Path(__file__).parents[2] / 'config/sros2/policies.xml')
 UNUSED = {'/clock'}  # only with use_sim_time
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 BRIDGE = ('-p', "connections:=['udpin:127.0.0.1:0']")
 
 
@@ -122,3 +124,27 @@ def test_an_allocator_exits_in_order_during_a_solve(start, probe, number, tmp_pa
     probe.until(lambda: 'u reports' in process.output())
     code, out = process.stop(number)
     assert (code, 'Traceback' in out) == (0, False)
+
+
+def test_publishers_that_are_not_received_are_in_the_diagnostics(start, probe):
+    start('allocator')
+    start('mavlink_bridge', *BRIDGE)
+    shown = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    publishers = [probe.node.create_publisher(m.TaskAnnouncement, 'task_announcements', 10),
+                  probe.node.create_publisher(m.ThreatZoneArray, 'threat_zones', BEST_EFFORT)]
+    zones = ('threat_zones: nothing is received of probe, which offers reliability best_effort: '
+             'expected reliable')
+    tasks = ('task_announcements: nothing is received of probe, which offers durability volatile: '
+             'expected transient_local')
+
+    def warnings(name):
+        return next((each.message for array in reversed(shown) for each in array.status
+                     if each.name.startswith(name) and each.level == each.WARN), '')
+
+    probe.until(lambda: tasks in warnings('/allocator') and zones in warnings('/allocator'))
+    probe.until(lambda: warnings('/mavlink_bridge: topics') == zones)
+    for publisher in publishers:
+        probe.node.destroy_publisher(publisher)
+    shown.clear()
+    probe.until(lambda: any(each.name.startswith('/allocator') and each.level == each.OK
+                            for array in shown for each in array.status))

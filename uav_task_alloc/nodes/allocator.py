@@ -50,6 +50,7 @@ from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.refusal_log import RefusalLog
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
+from uav_task_alloc.nodes.ros.unheard_publishers import unheard_publishers
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.record.message_records import from_stamp
@@ -359,6 +360,9 @@ class AllocatorNode(Node):
         warnings = health_warnings(self.world, self.persistence.error, self.solver_error,
                                    self.stamp())
         warnings += filter(None, [self.offsets.warning(time.monotonic()), self.refused_zones])
+        warnings += unheard_publishers(self, {
+            'task_announcements': INPUT_ANNOUNCEMENTS, 'threat_zones': LATCHED,
+            'task_events': INPUT_EVENTS, 'fleet_origin': LATCHED})
         sources = self.count_publishers('threat_zones')
         warnings += [f'threat_zones has {sources} publishers: expected one, as each message '
                      'replaces all zones'] if sources > 1 else []

@@ -41,6 +41,7 @@ from uav_task_alloc.nodes.ros.origin_check import OriginCheck
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.nodes.ros.task_list_inputs import TaskListInputs
+from uav_task_alloc.nodes.ros.unheard_publishers import unheard_publishers
 from uav_task_alloc.params import BridgeParams
 
 _STEP_PERIOD = 0.02  # [s] between steps of the protocols; messages are handled on arrival
@@ -264,7 +265,8 @@ class MavlinkBridge(Node):
                 self.store.retry()
             rows = self.report.vehicle_rows(now)
         self.origins.check()
-        rows += self.report.part_rows(self.origins.conflict())
+        rows += self.report.part_rows(self.origins.conflict(), unheard_publishers(
+            self, {'threat_zones': LATCHED, 'fleet_origin': LATCHED}))
         self.diagnostics.publish(from_diagnostics(rows, stamp))
 
     def stamp(self) -> float:
