@@ -227,3 +227,19 @@ def test_without_a_rule_nobody_holds():
     step = monitor.step(0.5, uavs, Separation())
     assert not monitor.holding
     assert not step.unresolved
+
+
+@pytest.mark.parametrize('beside', [0.0, 3.0])
+def test_one_that_comes_down_on_one_that_is_too_near_already_stops(beside):
+    """4.5 m above, where 5 m are required, and down through it: nearer in height alone."""
+    crafts = {'a': Craft((0, 0, 50)), 'b': Craft((beside, 0, 54.5), (beside, 0, 0), speed=0.3)}
+    _, _, held = fly(crafts, 60.0)
+    assert 'b' in held[-1]
+    assert crafts['b'].place[2] > 53.0
+
+
+def test_two_that_are_too_near_already_may_fly_apart_while_one_comes_down():
+    crafts = {'a': Craft((0, 0, 50)), 'b': Craft((6, 0, 54.0), (36, 0, 40), speed=5.0)}
+    _, _, held = fly(crafts, 30.0)
+    assert not set().union(*held)
+    assert not crafts['b'].points

@@ -236,25 +236,28 @@ def _first_loss(a: _Floats, b: _Floats, horizontal: float, vertical: float, shif
                 a_on_pad: _Flags, b_on_pad: _Flags) -> PredictedLoss | None:
     """The loss of two paths, each of which may be early or late; None: they stay apart.
 
-    Where it is lost already, it counts only if they come nearer: both may fly apart.
+    Where it is lost already, it counts only if they come nearer, also in height alone: both may
+    fly apart.
     """
     first, nearest, best, share = math.inf, (0.0, 0.0), math.inf, math.inf
     now = math.hypot(a[0, 0] - b[0, 0], a[0, 1] - b[0, 1])
-    if now < horizontal and abs(a[0, 2] - b[0, 2]) < vertical and not (
-            a_on_pad[0] and b_on_pad[0]):
+    height, beside, below, room = abs(a[0, 2] - b[0, 2]), 0.0, 0.0, horizontal
+    if now < horizontal and height < vertical and not (a_on_pad[0] and b_on_pad[0]):
+        beside, below = min(now + _NEARER, horizontal), height - _NEARER
         horizontal, shifts = max(0.0, now - _NEARER), 0
     for shift in range(0, shifts + 1, _SHIFT):
         for first_of, then_of in _ranges(shift):
             one, two = a[first_of], b[then_of]
             apart = np.hypot(one[:, 0] - two[:, 0], one[:, 1] - two[:, 1])
             above = np.abs(one[:, 2] - two[:, 2])
-            lost = (apart < horizontal) & (above < vertical) & ~(
-                a_on_pad[first_of] & b_on_pad[then_of])
+            lost = (apart < horizontal) & (above < vertical)
+            lost |= (apart < beside) & (above < below)
+            lost &= ~(a_on_pad[first_of] & b_on_pad[then_of])
             if not lost.any():
                 continue
             at = np.flatnonzero(lost)
             first = min(first, float(at[0]) * _DT)
-            share = min(share, float(np.maximum(apart[at] / horizontal,
+            share = min(share, float(np.maximum(apart[at] / room,
                                                 above[at] / vertical).min()))
             k = at[np.argmin(apart[at])]
             if apart[k] < best:
