@@ -23,7 +23,7 @@ from uav_task_alloc.separation.monitor import SeparationAlert, SeparationHold
 
 _Response = TypeVar('_Response')
 _SOURCES = {m.UavHold.OPERATOR: OPERATOR, m.UavHold.SEPARATION: 'separation'}
-_LONGEST = 60.0  # [s] of a hold to keep UAVs separate
+SEPARATION_HOLD = 60.0  # [s] of a hold to keep UAVs separate
 
 
 def to_order_request(action: OrderAction, msg: Any) -> OrderRequest:
@@ -176,4 +176,4 @@ def hold_expiry(msg: m.UavHold, now: float) -> float:
         [s] of the published clock; inf: never. One to keep UAVs separate ends after 60 s at most.
     """
     expires = from_stamp(msg.expires) or math.inf
-    return min(expires, now + _LONGEST) if msg.source == m.UavHold.SEPARATION else expires
+    return min(expires, now + SEPARATION_HOLD) if msg.source == m.UavHold.SEPARATION else expires

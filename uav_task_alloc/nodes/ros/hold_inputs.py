@@ -11,7 +11,11 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.nodes.conversions.messages import HOLDS
-from uav_task_alloc.nodes.conversions.orders import hold_expiry, to_hold_request
+from uav_task_alloc.nodes.conversions.orders import (
+    SEPARATION_HOLD,
+    hold_expiry,
+    to_hold_request,
+)
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.topic_names import HOLD, check_topic
 
@@ -73,3 +77,5 @@ class HoldInputs:
             if now >= expires:
                 self._expires[uav_id, source] = math.inf
                 self._apply(uav_id, HoldRequest(source, False))
+            elif source == 'separation' and expires < math.inf:  # after the clock went back, too
+                self._expires[uav_id, source] = min(expires, now + SEPARATION_HOLD)
