@@ -175,6 +175,27 @@ def test_a_silent_uav_is_where_its_velocity_has_taken_it():
         assert sky.step() == []
 
 
+def test_a_silent_uav_has_flown_on_since_its_last_report():
+    sky = Sky({}, {'home': (300.0, -300.0, 0.0)})
+    sky.report((-400.0, 0.0, 50.0), (0.0, -165.0, 50.0))
+    sky.step()
+    sky.now += 5.0
+    sky.uav('u1', -75.0, 0.0, 50.0, **sky.more[0])
+    sky.world.fleet.mark_silent(sky.now, 5.0)
+    assert sky.step() == [('u1', True)]  # 75 m from where both are in 5 s
+
+
+def test_a_uav_whose_bridge_repeats_a_position_on_a_stale_link_has_flown_on():
+    sky = Sky({}, {'home': (300.0, -300.0, 0.0)})
+    sky.report((-400.0, 0.0, 50.0), (0.0, -135.0, 50.0))
+    sky.world.params = replace(sky.world.params, uav_timeout=2.0)  # repeated, it is not silent
+    sky.step()
+    sky.now += 3.5
+    sky.more[1] |= {'authority': 'SUSPENDED', 'available': False}
+    sky.report((-75.0, 0.0, 50.0), (0.0, -135.0, 50.0))
+    assert sky.step() == [('u1', True)]
+
+
 def test_holds_are_renewed_and_expire_within_a_minute():
     sky = Sky({}, {'authority': 'LOST', 'velocity': (0.0, 0.0, 0.0)})
     for _ in range(120):

@@ -62,6 +62,8 @@ class SeparationWatch:
         self._world, self.monitor = world, SeparationMonitor()
         self._stepped = self._asked = -math.inf  # [s] published clock; of the last plan asked for
         self._silent: dict[str, float] = {}  # by id: published clock [s] when it was found silent
+        # by id: the last position [m], and the published clock [s] of the first report with it
+        self._placed: dict[str, tuple[Point, float]] = {}
         # [s] published clock, by ids of a UAV that holds and of one that waits by its list
         self._both_wait: dict[tuple[str, str], float] = {}
         self._uavs: dict[str, MonitoredUav] = {}  # of the last step, by id
@@ -118,6 +120,8 @@ class SeparationWatch:
             by: [s] of the jump.
         """
         self._silent.update((uav_id, stamp + by) for uav_id, stamp in self._silent.items())
+        self._placed.update((uav_id, (place, stamp + by))
+                            for uav_id, (place, stamp) in self._placed.items())
         self._both_wait.update((pair, stamp + by) for pair, stamp in self._both_wait.items())
 
     def texts(self) -> dict[str, str]:
@@ -169,6 +173,7 @@ class SeparationWatch:
         hold = self._world.orders.holds.get(uav_id)
         is_held = hold is not None and hold.hold
         silent = self._silent_for(uav_id, record, stamp)
+        age = self._age(uav_id, record, stamp, silent)
         if silent > FORGOTTEN or flight is None:
             return None
         if report.standby:
@@ -183,7 +188,7 @@ class SeparationWatch:
             why = 'is silent' if record.silent else 'is not flown by the allocator'
             points = (timed_own_return(record, flight.pace)
                       if not silent and seems_to_return(record)
-                      else timed_drift(record, silent))
+                      else timed_drift(record, age))
             return MonitoredUav(self._way(record, points), (_FOREIGN,), False, f'{uav_id} {why}')
         if is_held:
             return MonitoredUav(self._way(record, [(0.0, report.position)]), (_HELD,), False,
@@ -195,9 +200,9 @@ class SeparationWatch:
     def _note_lists(self) -> None:
         """Keep the list that a UAV reports to be on board, and those that may follow it."""
         records = self._world.uav_records()
-        for uav_id in (self._sent.keys() | self._silent.keys()) - records.keys():
-            self._sent.pop(uav_id, None)
-            self._silent.pop(uav_id, None)
+        for kept_by_id in (self._sent, self._silent, self._placed):
+            for uav_id in kept_by_id.keys() - records.keys():
+                del kept_by_id[uav_id]
         for uav_id, record in records.items():
             kept, current = self._sent.setdefault(uav_id, {}), self._world.list_of(uav_id)
             kept[current.revision] = current
@@ -234,6 +239,14 @@ class SeparationWatch:
             self._silent.pop(uav_id, None)
             return 0.0
         return stamp - self._silent.setdefault(uav_id, stamp)
+
+    def _age(self, uav_id: str, record: UavRecord, stamp: float, silent: float) -> float:
+        """[s] since a UAV was where it reports to be; a stale link repeats its last position."""
+        place = record.report.position
+        if self._placed.get(uav_id, (None,))[0] != place:
+            self._placed[uav_id] = place, min(stamp, self._world.flights.reported_at(uav_id))
+        age = stamp - self._placed[uav_id][1]
+        return max(silent, min(age, silent + 2.0 * self._world.params.uav_timeout))
 
     def _flying(self, uav_id: str, record: UavRecord, flight: UavFlight, stamp: float
                 ) -> MonitoredUav:
