@@ -55,6 +55,7 @@ class Craft:
     started: set[str] = field(default_factory=set)
     done: set[str] = field(default_factory=set)
     goes_home: bool = False  # its list ends with a return
+    via: tuple[Point, ...] = ()  # detour points of the leg under way, as of its last list
 
     def receive(self, order: object, now: float) -> None:
         """Take a list or a hold, which is flown after the delay of the link."""
@@ -131,7 +132,7 @@ class Craft:
             legs += [Leg(point) for point in order.end_via]
         waits = bool(self.waiting[0]) and now < self.until
         if (not self.legs and not self.landed) or self.climbing or self.serving or waits:
-            self.legs = legs  # no leg is under way
+            self.legs, self.via = legs, _detour(legs)  # no leg is under way
         else:
             self.legs = self._not_passed(legs)
         if self.landed and self.legs:
@@ -154,8 +155,14 @@ class Craft:
         return next((leg.task for leg in self.legs if leg.task), '')
 
     def _not_passed(self, legs: list[Leg]) -> list[Leg]:
-        """A list for a leg under way goes on after the detour points that were passed."""
+        """A list for a leg under way goes on after the detour points that were passed.
+
+        Where it stands, as it holds, other detour points than before are flown.
+        """
         ahead = self.legs[0].point if self.legs else None
+        before, self.via = self.via, _detour(legs)
+        if self.rate <= 0.0 and self.via != before:
+            return legs
         for k, leg in enumerate(legs):
             if leg.point == ahead and not self.landed:
                 return legs[k:]
@@ -234,6 +241,12 @@ class Craft:
             self.serving, self.until, self.rate = leg.task, now + leg.service, 0.0
         else:
             self._wait(now)
+
+
+def _detour(legs: list[Leg]) -> tuple[Point, ...]:
+    """The points before the first task."""
+    first = next((k for k, leg in enumerate(legs) if leg.task), 0)
+    return tuple(leg.point for leg in legs[:first])
 
 
 @dataclass(frozen=True, slots=True)
