@@ -185,6 +185,17 @@ def test_a_silent_uav_has_flown_on_since_its_last_report():
     assert sky.step() == [('u1', True)]  # 75 m from where both are in 5 s
 
 
+def test_a_silent_uav_may_fly_its_list_on_and_not_only_straight_ahead():
+    sky = Sky({}, {'velocity': (0.0, 0.0, 0.0)})  # it sets out
+    sky.more[1]['list_revision'] = sky.world.list_of('u2').revision
+    sky.report((-400.0, 0.0, 50.0), (0.0, -90.0, 50.0))
+    sky.step()
+    sky.now += 5.0
+    sky.uav('u1', -20.0, 0.0, 50.0, **sky.more[0])
+    sky.world.fleet.mark_silent(sky.now, 5.0)
+    assert sky.step() == [('u1', True)]
+
+
 def test_a_uav_whose_bridge_repeats_a_position_on_a_stale_link_has_flown_on():
     sky = Sky({}, {'home': (300.0, -300.0, 0.0)})
     sky.report((-400.0, 0.0, 50.0), (0.0, -135.0, 50.0))

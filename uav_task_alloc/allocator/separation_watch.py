@@ -189,7 +189,11 @@ class SeparationWatch:
             points = (timed_own_return(record, flight.pace)
                       if not silent and seems_to_return(record)
                       else timed_drift(record, age))
-            return MonitoredUav(self._way(record, points), (_FOREIGN,), False, f'{uav_id} {why}')
+            way = self._way(record, points)
+            if record.silent:  # it may fly its list on
+                way = replace(way, on_board=tuple((t - age, point) for t, point in (
+                    self._along_reported(uav_id, record, flight))))
+            return MonitoredUav(way, (_FOREIGN,), False, f'{uav_id} {why}')
         if is_held:
             return MonitoredUav(self._way(record, [(0.0, report.position)]), (_HELD,), False,
                                 f'an operator holds {uav_id}')
@@ -223,6 +227,11 @@ class SeparationWatch:
             return []
         if report.mode == 'HOLD':
             return [(0.0, flight.position)]
+        return self._along_reported(uav_id, record, flight)
+
+    def _along_reported(self, uav_id: str, record: UavRecord, flight: UavFlight) -> TimedPoints:
+        """Along the list that a UAV in mission mode reports to be on board; []: not known."""
+        report = record.report
         each = self._sent.get(uav_id, {}).get(report.list_revision)
         if each is None or report.mode not in ('ON_MISSION', 'RETURNING'):
             return []
