@@ -66,23 +66,12 @@ def test_a_mode_that_does_not_exist_is_refused(kind, number):
 @pytest.mark.parametrize(('kind', 'number'), STICK + STOPS)
 def test_in_stick_modes_and_its_own_it_stops_and_stays(kind, number):
     bench = flying(kind)
-    bench.vehicle.rc_stick(None)
     bench.set_mode(number)
     bench.pass_time(8.0)
     where = bench.flight.body.position
     bench.pass_time(20.0)
     assert metres_between(bench.flight.body.position, where) < 0.1
     assert bench.flight.armed
-
-
-@pytest.mark.parametrize('number', COPTER_STICK)
-def test_an_arducopter_without_a_radio_control_sinks_in_a_stick_mode_and_disarms(number):
-    bench = flying('ardupilot')
-    bench.set_mode(number)
-    bench.pass_time(6.0)
-    assert bench.flight.body.velocity == pytest.approx((0.0, 0.0, -2.5), abs=0.01)
-    bench.until(lambda: not bench.flight.armed, 30.0)
-    assert bench.flight.landed
 
 
 @pytest.mark.parametrize(('kind', 'number'), STICK)

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from uav_task_alloc.model import Point
 from uav_task_alloc.sim import stored_item as item_
 from uav_task_alloc.sim.boot import BootTimes
 from uav_task_alloc.sim.config import FlightMode, StorageChange
@@ -19,7 +18,6 @@ _GUIDED = {dialect.COPTER_MODE_GUIDED, dialect.COPTER_MODE_GUIDED_NOGPS}
 # commands on the way whose end ArduCopter reports; AP_Mission carries out the others itself
 _REPORTED = {item_.CHANGE_SPEED, item_.YAW, item_.ROI, dialect.MAV_CMD_DO_SET_ROI_NONE,
              dialect.MAV_CMD_DO_MOUNT_CONTROL}
-_SINKS: Point = (0.0, 0.0, -2.5)  # [m/s] ENU: PILOT_SPEED_UP, which is that down by default
 _FIRST_PREARM, _PREARM_PERIOD = 15.0, 30.0  # [s] after power-up; between texts
 
 
@@ -96,9 +94,6 @@ class ArduPilotFlight(VehicleFlight):
         reason = '' if self.armed else self.prearm_refusal()
         if reason:
             self.texts.append((CRITICAL, f'PreArm: {reason}'))
-
-    def stick_velocity(self) -> Point | None:
-        return self.stick if self.has_radio else _SINKS  # the throttle of no radio is the lowest
 
     def _stop_motors(self) -> None:
         was_armed = self.armed
