@@ -12,11 +12,11 @@ BEGIN = 10_000  # [s]
 
 
 class Inputs:
-    """The holds of u1, and what the bridge is told of them."""
+    """Hold messages of u1, and the requests that its bridge gets."""
 
     def __init__(self):
-        self.now, self.told = float(BEGIN), []
-        self.inputs = HoldInputs(self, None, lambda: self.now, self.tell)
+        self.now, self.requests = float(BEGIN), []
+        self.inputs = HoldInputs(self, None, lambda: self.now, self.on_hold)
         self.inputs.subscribe('u1')
 
     def get_namespace(self):
@@ -25,8 +25,8 @@ class Inputs:
     def create_subscription(self, kind, topic, callback, qos):
         self.take = callback
 
-    def tell(self, uav_id, request):
-        self.told.append((request.source, request.hold))
+    def on_hold(self, uav_id, request):
+        self.requests.append((request.source, request.hold))
 
     def fly(self, seconds):
         for _ in range(seconds):
@@ -44,21 +44,21 @@ def test_without_an_allocator_a_separation_hold_ends_in_a_minute_whatever_the_cl
     bridge.take(hold(m.UavHold.SEPARATION, BEGIN + 3600))
     bridge.now += by
     bridge.fly(55)
-    assert bridge.told == [('separation', True)]
+    assert bridge.requests == [('separation', True)]
     bridge.fly(10)
-    assert bridge.told == [('separation', True), ('separation', False)]
+    assert bridge.requests == [('separation', True), ('separation', False)]
     bridge.fly(200)
-    assert len(bridge.told) == 2
+    assert len(bridge.requests) == 2
 
 
 def test_a_hold_of_an_operator_ends_when_it_says():
     bridge = Inputs()
     bridge.take(hold(m.UavHold.OPERATOR, BEGIN + 300))
     bridge.fly(299)
-    assert len(bridge.told) == 1
+    assert len(bridge.requests) == 1
     bridge.fly(1)
-    assert bridge.told == [('operator', True), ('operator', False)]
+    assert bridge.requests == [('operator', True), ('operator', False)]
     bridge.take(hold(m.UavHold.OPERATOR, 0))
     bridge.now = math.nextafter(1e9, 0.0)
     bridge.inputs.step()
-    assert bridge.told[-1] == ('operator', True)
+    assert bridge.requests[-1] == ('operator', True)
