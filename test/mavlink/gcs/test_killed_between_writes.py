@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bridge killed before or after any write to its state_dir: no task is lost or flown twice."""
 import pytest
-from flight_bench import FlightBench, Store, places
+from flight_bench import FlightBench, Store, flying, places
 from mission_bench import REPORTS_STATE, task_list
 
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
@@ -164,3 +164,21 @@ def test_killed_as_it_reaches_an_item_in_a_replacement_nothing_else_is_completed
     bench.start()
     bench.fly()  # which compares what is completed with what it has reached
     assert set(bench.reached()) == set(ROW)
+
+
+@pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+def test_what_is_reported_or_answered_is_stored_before(kind):
+    bench, seen = flying(kind), []
+    receive = bench.ground_station.receive
+
+    def checked(address, message, now):
+        out, executor = receive(address, message, now), bench.executor()
+        before = bench.store.saved
+        executor.watch.save_record()
+        seen.extend(['event'] * len(executor.events) + ['answer'] * len(out))
+        assert bench.store.saved == before or not (executor.events or out), message.get_type()
+        return out
+    bench.ground_station.receive = checked
+    bench.assign(task_list('ABXC', 2))
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'X', 'C'])
+    assert {'event', 'answer'} <= set(seen)

@@ -130,7 +130,7 @@ class AuthorityWatch:
                 self._arming.armed_changed(was_returning, now)
         state.heartbeat_at = now
         check_system_status(state, now)
-        self._save_record()
+        self.save_record()
 
     def receive_command_ack(self, message: Message, frame: int) -> None:
         """Process a COMMAND_ACK that is addressed to us, and the number of its frame."""
@@ -141,10 +141,13 @@ class AuthorityWatch:
         if self._state.texts.receive(message, now):
             self._state.apply(AuthorityEvent.KILLED, now,
                               f'the vehicle reports: {message.text}')
-        self._save_record()
+        self.save_record()
 
     def step(self, now: float) -> None:
-        """Apply what depends on time and telemetry; called after most messages too."""
+        """Apply what depends on time and telemetry; called after most messages too.
+
+        What changes is saved by `save_record`.
+        """
         self._link.step(now)
         self._restart.step(now)
         self._modes.resolve(now)
@@ -153,7 +156,6 @@ class AuthorityWatch:
         self._climb.step(now)
         self._grant.step(now)
         check_foreign(self._state, self.yields, now)
-        self._save_record()
 
     def address_changed(self, now: float) -> None:
         """Apply that its messages come from a new address: it may be another vehicle."""
@@ -162,7 +164,7 @@ class AuthorityWatch:
     def vehicle_rebooted(self, now: float) -> None:
         """Apply a reboot of the vehicle, of which its clock went back."""
         self._link.vehicle_rebooted(now)
-        self._save_record()
+        self.save_record()
 
     def mark_task(self, task: str, position: Point | None, flown: bool, now: float) -> None:
         """Record that a task was flown or skipped, for a restarted bridge.
@@ -200,11 +202,11 @@ class AuthorityWatch:
             if takeoff_mode is not None:
                 sent.acks.command_sent(message.command, takeoff_mode, now)
                 sent.add_mode(takeoff_mode, now)
-        self._save_record()
+        self.save_record()
 
     def record_upload(self) -> None:
         """Record an upload that is about to begin; the record is saved when this returns."""
-        self._save_record()
+        self.save_record()
 
     def hand_over(self, operator: str, now: float) -> str:
         """Hand the vehicle over to the bridge, as an operator requests.
@@ -220,9 +222,10 @@ class AuthorityWatch:
             return ''
         refusal = self._hand_over.request(operator, now)
         if not refusal:
-            self._save_record()
+            self.save_record()
         return refusal
 
-    def _save_record(self) -> None:
+    def save_record(self) -> None:
+        """Save the record where it has changed, unless the one of the previous run is in doubt."""
         if not self._restart.pending:
             self._recorder.save_if_changed()

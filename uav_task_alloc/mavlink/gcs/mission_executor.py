@@ -210,7 +210,10 @@ class MissionExecutor:
         self._messages.receive(message, newest, now)
         if not out and message.get_type() in HEALTH_REPORTS:
             return []
-        return self._gate(out + self._act(now), now)
+        out += self._act(now, saves=False)
+        if out or self.events:  # else it is saved at the next step
+            self.watch.save_record()
+        return self._gate(out, now)
 
     def step(self, now: float) -> list[Message]:
         """Advance time; returns the messages to send."""
@@ -224,10 +227,12 @@ class MissionExecutor:
         """Drop messages that authority does not allow; every message passes here."""
         return allowed_messages(messages, self.watch, now)
 
-    def _act(self, now: float) -> list[Message]:
+    def _act(self, now: float, saves: bool = True) -> list[Message]:
         self._report(now)  # the marks are saved with the current item that is past their tasks
         self.onboard.check_replaced()
         self.watch.step(now)
+        if saves:
+            self.watch.save_record()
         self.onboard.complete_flown(now)
         for rule in self._rules:
             if (out := rule(now)) is not None:
