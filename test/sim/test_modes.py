@@ -66,12 +66,39 @@ def test_a_mode_that_does_not_exist_is_refused(kind, number):
 @pytest.mark.parametrize(('kind', 'number'), STICK + STOPS)
 def test_in_stick_modes_and_its_own_it_stops_and_stays(kind, number):
     bench = flying(kind)
+    bench.vehicle.rc_stick(None)
     bench.set_mode(number)
     bench.pass_time(8.0)
     where = bench.flight.body.position
     bench.pass_time(20.0)
     assert metres_between(bench.flight.body.position, where) < 0.1
     assert bench.flight.armed
+
+
+@pytest.mark.parametrize('number', COPTER_STICK)
+def test_an_arducopter_without_a_radio_control_sinks_in_a_stick_mode_and_disarms(number):
+    bench = flying('ardupilot')
+    bench.set_mode(number)
+    bench.pass_time(6.0)
+    assert bench.flight.body.velocity == pytest.approx((0.0, 0.0, -2.5), abs=0.01)
+    bench.until(lambda: not bench.flight.armed, 30.0)
+    assert bench.flight.landed
+
+
+def test_centred_sticks_of_a_station_keep_an_arducopter_up_until_they_end():
+    bench = flying('ardupilot')
+    bench.set_mode(d.COPTER_MODE_LOITER)
+    sticks = d.MAVLink_rc_channels_override_message(bench.vehicle.config.system_id, 1,
+                                                    *[1500] * 4, *[0xffff] * 4)
+    for _ in range(20):
+        bench.send(sticks)
+        bench.pass_time(1.0)
+    height = bench.flight.body.position[2]
+    bench.send(sticks)
+    bench.pass_time(2.9)
+    assert bench.flight.body.position[2] == pytest.approx(height, abs=0.01)
+    bench.pass_time(3.0)
+    assert bench.flight.body.position[2] < height - 3.0
 
 
 @pytest.mark.parametrize(('kind', 'number'), STICK)

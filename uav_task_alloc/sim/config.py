@@ -49,7 +49,8 @@ class VehicleConfig:
 class FlightMode(Enum):
     """What the vehicle does; `modes` maps the custom modes of each autopilot to these.
 
-    MANUAL is flown by the pilot's stick, and so is HOLD on ArduCopter (LOITER).
+    MANUAL is flown by the pilot's stick, and so is HOLD on ArduCopter (LOITER): without a radio
+    control it sinks there.
     """
 
     MANUAL = 'manual'

@@ -74,17 +74,19 @@ class Interventions:
 
     def rc_mode(self, custom_mode: int) -> bool:
         """The pilot's mode switch; False where the autopilot does not enter that mode."""
+        self.flight.has_radio = True
         with self.flight.caused_by('pilot'):
             return self.flight.set_custom_mode(custom_mode)
 
     def rc_arm(self, armed: bool, force: bool = False) -> bool:
         """The pilot's arm switch; False where it is refused. A forced disarm in the air falls."""
+        self.flight.has_radio = True
         with self.flight.caused_by('pilot'):
             return self.flight.arm(force) if armed else self.flight.disarm(force)
 
     def rc_stick(self, velocity: Point | None) -> None:
         """The pilot's sticks command a velocity ENU [m/s] in stick modes; None: centred."""
-        self.flight.stick = velocity
+        self.flight.has_radio, self.flight.stick = True, velocity
 
     def failsafe(self, kind: str, mode: int | None) -> None:
         """Begin a failsafe.

@@ -64,6 +64,7 @@ class VehicleFlight(Navigation):
         self.arming_fault = ''  # an injected reason to refuse arming; '': none
         self.terminated = False  # the kill switch is on
         self.stick: Point | None = None  # [m/s] ENU commanded by the pilot
+        self.has_radio = False  # the pilot has a radio control on
         self.now = 0.0  # [s]
         self.custom_mode = self.custom_modes[self.start_mode]
         self.armed, self.landed = False, True
@@ -289,7 +290,7 @@ class VehicleFlight(Navigation):
     def _move(self, dt: float) -> None:
         if self.mode is FlightMode.MISSION and self.track is None:
             self.next_item()
-        stick = self.stick if self.modes[self.custom_mode].stick else None
+        stick = self.stick_velocity() if self.modes[self.custom_mode].stick else None
         if self.landed:
             climbs = stick is not None and stick[2] > 0.0
             if not climbs and (self.track is None or self.track.target is None):
@@ -306,6 +307,13 @@ class VehicleFlight(Navigation):
             self.texts.append((CRITICAL, 'Battery empty: landing'))
             with self.caused_by('failsafe'):
                 self.set_mode(FlightMode.LAND)
+
+    def override_sticks(self) -> None:
+        """Take the sticks, which are centred, from a message of a station where it does so."""
+
+    def stick_velocity(self) -> Point | None:
+        """Velocity [m/s] ENU in a stick mode; None: it hovers."""
+        return self.stick
 
     def _steer(self, dt: float, velocity: Point) -> None:
         self.body.steer(dt, velocity)

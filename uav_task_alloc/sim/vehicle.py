@@ -97,6 +97,7 @@ class Vehicle(Interventions):
             'COMMAND_LONG': self._command_long, 'COMMAND_INT': self._command_int,
             'SET_MODE': self._set_mode, 'MISSION_SET_CURRENT': self._set_current,
             'PARAM_REQUEST_READ': self.parameters.receive, 'PARAM_SET': self._set_parameter,
+            'RC_CHANNELS_OVERRIDE': self._override_sticks,
         }
         self.reboot(now)
         self.flight.events.clear()
@@ -252,6 +253,10 @@ class Vehicle(Interventions):
         out = self.parameters.receive(m)
         self.flight.return_height = self.parameters.return_height
         return out
+
+    def _override_sticks(self, m: Message) -> list[Message]:
+        self.flight.override_sticks()
+        return []
 
     def _set_current(self, m: Message) -> list[Message]:
         if m.target_component not in (AUTOPILOT_COMPONENT, 0):

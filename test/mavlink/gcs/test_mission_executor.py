@@ -155,6 +155,7 @@ def test_no_space_flies_a_rolling_horizon(kind):
 def test_a_pilot_who_takes_over_is_not_fought(kind):
     bench = flying(kind, 'ABC')
     bench.run(limit=5.0)
+    bench.vehicles[1].rc_stick(None)  # without a radio control an ArduCopter sinks in LOITER
     mode = (5, 0) if kind == 'ardupilot' else (4, 3)
     bench.from_station(d.MAVLink_command_long_message(
         1, 1, d.MAV_CMD_DO_SET_MODE, 0, 1, *mode, 0, 0, 0, 0))

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from uav_task_alloc.model import Point
 from uav_task_alloc.sim import stored_item as item_
 from uav_task_alloc.sim.boot import BootTimes
 from uav_task_alloc.sim.config import FlightMode, StorageChange
@@ -18,6 +19,8 @@ _GUIDED = {dialect.COPTER_MODE_GUIDED, dialect.COPTER_MODE_GUIDED_NOGPS}
 # commands on the way whose end ArduCopter reports; AP_Mission carries out the others itself
 _REPORTED = {item_.CHANGE_SPEED, item_.YAW, item_.ROI, dialect.MAV_CMD_DO_SET_ROI_NONE,
              dialect.MAV_CMD_DO_MOUNT_CONTROL}
+_SINKS: Point = (0.0, 0.0, -2.5)  # [m/s] ENU: PILOT_SPEED_UP, which is that down by default
+_OVERRIDE_TIME = 3.0  # [s]: RC_OVERRIDE_TIME, its default
 _FIRST_PREARM, _PREARM_PERIOD = 15.0, 30.0  # [s] after power-up; between texts
 
 
@@ -65,6 +68,7 @@ class ArduPilotFlight(VehicleFlight):
         self._upcoming = 1  # seq where the search for the next flown item begins
         self._waiting: list[int] = []  # commands still to be carried out on this leg
         self._prearm_at = now + _FIRST_PREARM
+        self._overridden_until = now  # [s] sticks by messages of a station
 
     @property
     def mission_state(self) -> int:
@@ -94,6 +98,13 @@ class ArduPilotFlight(VehicleFlight):
         reason = '' if self.armed else self.prearm_refusal()
         if reason:
             self.texts.append((CRITICAL, f'PreArm: {reason}'))
+
+    def override_sticks(self) -> None:
+        self._overridden_until = self.now + _OVERRIDE_TIME
+
+    def stick_velocity(self) -> Point | None:
+        has_radio = self.has_radio or self.now < self._overridden_until
+        return self.stick if has_radio else _SINKS  # the throttle of no radio is the lowest
 
     def _stop_motors(self) -> None:
         was_armed = self.armed
