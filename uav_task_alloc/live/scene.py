@@ -49,7 +49,7 @@ class Scene:
         self.routes: RouteLists | None = None  # of the last plan
         self.silent: set[str] = set()
         self.last_authority: LogEntry = {}
-        self.last_nodes: LogEntry = {'silent': None, 'warnings': []}
+        self.last_nodes: LogEntry = {'silent': None, 'bridges': {}, 'warnings': []}
         self.last_orders: dict[str, dict[str, str]] = {}  # by allocator
         self.waiting: Line | None = None  # the plan that waits for an operator
         self.last: LogEntry = {'times': {}, 'works': {}}  # these parts as last sent
@@ -196,7 +196,7 @@ class Scene:
                 'since': None if reported.since is None else round(reported.since)}
 
     def nodes(self, now: float, ended: bool) -> LogEntry:
-        """Since when no allocator reports [unix s] (`silent`), and warnings that are of no UAV.
+        """Since when no allocator (`silent`) or bridge reports [unix s], and warnings of no UAV.
 
         Args:
             now, ended: see `updates`.
@@ -204,6 +204,7 @@ class Scene:
         run = self.run
         since = None if ended else run.allocators.silent_since(now, run.stretch)
         return {'silent': since and round(since, 1),
+                'bridges': {} if ended else run.bridges.silent(now, run.stretch),
                 'warnings': run.bridges.other_warnings(run.uavs, now, run.stretch)}
 
     def orders(self) -> LogEntry:

@@ -21,6 +21,7 @@ class BridgeReports:
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, int]] = {}  # by status: newest, of earlier runs
+        self._last: dict[str, float] = {}  # by bridge: [unix s] of its newest report on a UAV
         # by UAV or other hardware id, then status: [unix s], level, text
         self._health: dict[str, dict[str, tuple[float, int, str]]] = {}
 
@@ -29,6 +30,9 @@ class BridgeReports:
         for name, count in line['uploads'].items():
             last, earlier = self._counts.get(name, (0, 0))
             self._counts[name] = count, earlier + (last if count < last else 0)
+            bridge, colon, _ = name.partition(':')
+            if colon:  # as earlier versions do not write
+                self._last[bridge] = line['wall']
         # in recordings of earlier versions a row has no UAV: its name is the UAV
         for name, (level, text, *uavs) in line.get('health', {}).items():
             uav = uavs[0] if uavs else name
@@ -65,6 +69,19 @@ class BridgeReports:
                  for name, (at, level, text) in rows.items()
                  if level and wall - at <= _OUT_OF_DATE * second}
         return [f'{name}: {text}' for name, text in sorted(found.items())[:_MOST]]
+
+    def silent(self, wall: float, second: float) -> dict[str, float]:
+        """Return the bridges that have reported on UAVs, and do not any more.
+
+        Args:
+            wall: present time [unix s].
+            second: see the class.
+
+        Returns:
+            [unix s] of the last report, by the name of the node.
+        """
+        return {bridge: round(at, 1) for bridge, at in sorted(self._last.items())
+                if wall - at > _OUT_OF_DATE * second}
 
     @property
     def uploads(self) -> int | None:

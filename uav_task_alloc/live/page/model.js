@@ -61,7 +61,7 @@ export function readModel(past) {
     return uav;
   });
   const {orders = [], proposal = null} = parts.orders || {};
-  Object.assign(model, {orders, proposal, nodes: parts.nodes || {silent: null, warnings: []}});
+  Object.assign(model, {orders, proposal, nodes: parts.nodes || {silent: null, bridges: {}, warnings: []}});
   model.plans = live.plans.filter(plan => plan.wall <= wall);
   model.replans = model.plans.filter(plan => plan.first || plan.changes.length);
   model.events = live.events.filter(event => event.wall <= wall);

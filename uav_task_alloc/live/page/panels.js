@@ -87,10 +87,15 @@ function showAlarm(uavs) {
 }
 
 // What is wrong with nodes, links and other parts.
-export function showNodes({nodes: {silent, warnings}}) {
-  const texts = silent === null ? warnings : [`The allocator has not reported since ${
-    stamp(silent)} (${ofDay(silent)}): nothing is planned or counted as done, new zones are not `
-    + 'avoided, and UAVs go on with the lists that they have. Start it again.', ...warnings];
+export function showNodes({nodes: {silent, bridges, warnings}}) {
+  const since = wall => `has not reported since ${stamp(wall)} (${ofDay(wall)})`;
+  const texts = Object.entries(bridges).map(([name, wall]) => `${name} ${since(wall)}: its UAVs `
+    + 'fly the missions that they have, get no new list and are not seen. Start it again.');
+  if (silent !== null) {
+    texts.unshift(`The allocator ${since(silent)}: nothing is planned or counted as done, new `
+      + 'zones are not avoided, and UAVs go on with the lists that they have. Start it again.');
+  }
+  texts.push(...warnings);
   $('nodes').hidden = !texts.length;
   fill($('nodes'), JSON.stringify(texts), () =>
     texts.slice(0, MOST).map(text => make('li', `▲ ${text}`)));
