@@ -4,9 +4,10 @@ import math
 
 import pytest
 from builtin_interfaces.msg import Time
+from std_msgs.msg import Header
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.nodes.ros.hold_inputs import HoldInputs
+from uav_task_alloc.nodes.ros.hold_inputs import HoldInputs, LateHolds
 
 BEGIN = 10_000  # [s]
 
@@ -15,8 +16,8 @@ class Inputs:
     """Hold messages of u1, and the requests that its bridge gets."""
 
     def __init__(self):
-        self.now, self.requests = float(BEGIN), []
-        self.inputs = HoldInputs(self, None, lambda: self.now, self.on_hold)
+        self.now, self.requests, self.lines = float(BEGIN), [], []
+        self.inputs = HoldInputs(self, self, lambda: self.now, self.on_hold)
         self.inputs.subscribe('u1')
 
     def get_namespace(self):
@@ -24,6 +25,9 @@ class Inputs:
 
     def create_subscription(self, kind, topic, callback, qos):
         self.take = callback
+
+    def write(self, level, text):
+        self.lines.append(f'{level}: {text}')
 
     def on_hold(self, uav_id, request):
         self.requests.append((request.source, request.hold))
@@ -62,3 +66,43 @@ def test_a_hold_of_an_operator_ends_when_it_says():
     bridge.now = math.nextafter(1e9, 0.0)
     bridge.inputs.step()
     assert bridge.requests[-1] == ('operator', True)
+
+
+def test_that_a_separation_hold_has_expired_before_it_came_is_a_warning():
+    bridge = Inputs()
+    bridge.take(hold(m.UavHold.SEPARATION, BEGIN - 75))
+    assert bridge.requests == [('separation', False)]
+    assert bridge.lines == [
+        'warning: u1/hold: a hold to keep UAVs separate expired 75 s before it came, and is '
+        'ignored: expected machines whose clocks agree']
+    bridge.take(hold(m.UavHold.SEPARATION, BEGIN - 75))
+    assert len(bridge.lines) == 1
+
+
+def separation_hold(stamp):
+    return m.UavHold(header=Header(stamp=Time(sec=stamp)), uav_id='u1', hold=True,
+                     source=m.UavHold.SEPARATION, expires=Time(sec=stamp + 60))
+
+
+def test_late_separation_holds_are_logged_once_a_minute_and_warned_of_for_a_minute():
+    lines = []
+    late = LateHolds(lines.append)
+    for second in range(0, 121, 20):
+        late.add('u1', separation_hold(BEGIN - 100), BEGIN, float(second))
+    assert len(lines) == 3
+    assert 'expired 40 s before' in late.warning(179.0)
+    assert not late.warning(180.0)
+
+
+def test_a_hold_that_may_end_before_it_is_renewed_is_late_and_others_are_not():
+    lines = []
+    late = LateHolds(lines.append)
+    operator, end = hold(m.UavHold.OPERATOR, BEGIN - 75), separation_hold(BEGIN - 100)
+    end.hold = False
+    for msg in (operator, end, separation_hold(BEGIN - 5), separation_hold(BEGIN + 100),
+                hold(m.UavHold.SEPARATION, BEGIN + 10)):
+        late.add('u1', msg, BEGIN, 0.0)
+    assert not lines
+    assert not late.warning(0.0)
+    late.add('u1', separation_hold(BEGIN - 45), BEGIN, 0.0)
+    assert 'is stamped 45 s before the clock of this node' in late.warning(0.0)

@@ -73,7 +73,14 @@ def test_a_separation_hold_expires_and_a_bad_message_is_named(sky):
         expires=Time(sec=now.sec + 8, nanosec=now.nanosec)))
     probe.until(lambda: modes(sky)[1] == S.HOLD, 30.0)
     probe.until(lambda: modes(sky)[1] == S.ON_MISSION, 60.0)
+    sky.holds[1].publish(m.UavHold(
+        uav_id='uav_1', hold=True, source=m.UavHold.SEPARATION,
+        expires=Time(sec=now.sec - 600)))
+    probe.until(lambda: any('uav_1/hold: a hold to keep UAVs separate expired 6' in row.message
+                            for array in sky.health for row in array.status
+                            if row.name.endswith('holds')))
     text = sky.bridge.output()
+    assert 'before it came, and is ignored: expected machines whose clocks agree' in text
     assert "uav_1/hold: uav_id = 'uav_2': expected uav_1: ignored" in text
     assert 'goes on: separation ended its hold' in text
 

@@ -265,8 +265,9 @@ class MavlinkBridge(Node):
                 self.store.retry()
             rows = self.report.vehicle_rows(now)
         self.origins.check()
-        rows += self.report.part_rows(self.origins.conflict(), unheard_publishers(
-            self, {'threat_zones': LATCHED, 'fleet_origin': LATCHED}))
+        unheard = unheard_publishers(self, {'threat_zones': LATCHED, 'fleet_origin': LATCHED})
+        rows += self.report.part_rows(self.origins.conflict(), unheard,
+                                      self.holds.late.warning(now))
         self.diagnostics.publish(from_diagnostics(rows, stamp))
 
     def stamp(self) -> float:

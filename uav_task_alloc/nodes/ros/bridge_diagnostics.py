@@ -84,13 +84,14 @@ class BridgeDiagnostics:
         return [self._row(uav_id, each.level, each.summary, asdict(each.facts))
                 for uav_id, each in rows]
 
-    def part_rows(self, conflict: str,
-                  unheard: Sequence[str] = ()) -> Iterator[DiagnosticRow]:
+    def part_rows(self, conflict: str, unheard: Sequence[str] = (),
+                  late_hold: str = '') -> Iterator[DiagnosticRow]:
         """A row for each link and other part.
 
         Args:
             conflict: why the origins of the nodes differ; '' where they agree.
             unheard: a sentence for each publisher that is not received.
+            late_hold: what is wrong with a hold that expires too early; '' where none does.
         """
         refusal = conflict and f'refuses to fly new lists: {conflict}'
         self._log.report_trouble('fleet_origin', refusal)
@@ -100,6 +101,8 @@ class BridgeDiagnostics:
             yield self._row('threat_zones', _WARN, f'refused: {refused}')
         if unheard:
             yield self._row('topics', _WARN, '; '.join(unheard))
+        if late_hold:
+            yield self._row('holds', _WARN, late_hold)
         for link in self._connections.links:
             self._log.report_trouble(link.name, link.trouble)
             yield self._row(link.name, _ERROR if link.trouble else _OK, link.trouble or 'open')

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 
 from rclpy.node import Node
@@ -18,6 +19,61 @@ from uav_task_alloc.nodes.conversions.orders import (
 )
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.topic_names import HOLD, check_topic
+from uav_task_alloc.record.message_records import from_stamp
+
+_LATE = 35.0  # [s] from which a hold of a minute, renewed after 20 s, may end in between
+_WARNED = 60.0  # [s] steady time that a warning lasts, and between two lines in the log
+
+
+class LateHolds:
+    """Holds to keep UAVs separate that come too late by the published clock to be flown.
+
+    Machines whose clocks differ by a minute have no such holds.
+
+    Args:
+        log: writes a warning.
+    """
+
+    def __init__(self, log: Callable[[str], object]) -> None:
+        self._log = log
+        self._text, self._at, self._logged = '', -math.inf, -math.inf  # [s] steady time
+
+    def add(self, uav_id: str, msg: m.UavHold, now: float, steady: float) -> None:
+        """Compare a hold with the published clock.
+
+        Args:
+            uav_id: of the topic it came on.
+            msg: valid; one that ends, or is of an operator, is not late.
+            now: the published clock [s].
+            steady: [s].
+        """
+        if not msg.hold or msg.source != m.UavHold.SEPARATION:
+            return
+        stamp, expires = from_stamp(msg.header.stamp), from_stamp(msg.expires) or math.inf
+        if expires <= now:
+            text = f'expired {now - expires:.0f} s before it came, and is ignored'
+        elif stamp > 0.0 and now - stamp >= _LATE:
+            text = (f'is stamped {now - stamp:.0f} s before the clock of this node, and may end '
+                    'before it is renewed')
+        else:
+            return
+        self._at = steady
+        self._text = (f'{uav_id}/hold: a hold to keep UAVs separate {text}: expected machines '
+                      'whose clocks agree')
+        if steady - self._logged >= _WARNED:
+            self._logged = steady
+            self._log(self._text)
+
+    def warning(self, steady: float) -> str:
+        """Return what is wrong with the last late hold.
+
+        Args:
+            steady: [s].
+
+        Returns:
+            '' where none has come for a minute.
+        """
+        return self._text if steady - self._at < _WARNED else ''
 
 
 class HoldInputs:
@@ -36,6 +92,7 @@ class HoldInputs:
         self._known: set[str] = set()  # UAVs
         # [s] published clock when a hold ends, by UAV and source
         self._expires: dict[tuple[str, str], float] = {}
+        self.late = LateHolds(lambda text: log.write('warning', text))
 
     def subscribe(self, uav_id: str) -> None:
         """Subscribe to the holds of a UAV, once; an id that is too long for a topic is logged.
@@ -64,8 +121,10 @@ class HoldInputs:
         except InvalidValue as error:
             self._log.write('warning', f'{uav_id}/hold: {error}: ignored')
             return
-        expires = hold_expiry(msg, self._stamp())
-        if request.hold and expires <= self._stamp():
+        now = self._stamp()
+        self.late.add(uav_id, msg, now, time.monotonic())
+        expires = hold_expiry(msg, now)
+        if request.hold and expires <= now:
             request = HoldRequest(request.source, False)
         self._expires[uav_id, request.source] = expires if request.hold else math.inf
         self._apply(uav_id, request)
