@@ -20,7 +20,7 @@ def test_a_missing_clock_is_logged_once_and_its_start_is_no_jump():
     readings = [(0.0, 0.5 * k) for k in range(40)] + [(1e9 + k, 20.0 + k) for k in range(5)]
     first, second = lines(*readings)
     assert first == 'use_sim_time is true, and nothing publishes /clock: waiting for it'
-    assert second == '/clock runs again after 20 s'
+    assert second == '/clock has begun after 20 s'
 
 
 def test_a_clock_that_stands_still_is_logged_once_and_again_when_it_runs():

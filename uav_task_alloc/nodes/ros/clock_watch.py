@@ -48,7 +48,8 @@ class ClockWatch:
             return f'/clock went back by {before - ros:.1f} s, to {ros:.1f} s'
         if before > 0.0 and ros - before > _STEP + _FASTEST * (steady - since):
             return f'/clock jumped forward by {ros - before:.1f} s, to {ros:.1f} s'
-        return f'/clock runs again after {steady - since:.0f} s' if still else ''
+        runs = 'runs again' if before > 0.0 else 'has begun'
+        return f'/clock {runs} after {steady - since:.0f} s' if still else ''
 
 
 class ClockOffsets:
