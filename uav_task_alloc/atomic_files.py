@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that are replaced atomically, or read whole; changes of folders that survive a crash."""
+"""Files replaced atomically, or read whole; folders synced, or locked for one process."""
 from __future__ import annotations
 
+import fcntl
 import os
 import stat
 from pathlib import Path
@@ -67,3 +68,30 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def lock_folder(folder: Path) -> int | None:
+    """Lock a folder for this process; the lock ends with the process, however it ends.
+
+    Args:
+        folder: that exists.
+
+    Returns:
+        A descriptor, whose closing ends the lock; None where the file system has no locks.
+
+    Raises:
+        BlockingIOError: another process has locked it.
+    """
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        raise
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor

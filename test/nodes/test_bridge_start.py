@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The start of the bridge as a process: what it refuses, and what it logs."""
+import signal
+
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
@@ -84,3 +86,18 @@ def test_a_bridge_logs_what_it_listens_to_and_that_it_finds_no_vehicle(start, pr
                  '[WARN [mavlink_bridge]: no vehicle found for 10 s: expected the heartbeat of an '
                  'autopilot on udpin:127.0.0.1:0, tcp:127.0.0.1:1'):
         assert lines.count(line) == 1
+
+
+def test_a_second_bridge_with_the_state_dir_of_one_that_runs_does_not_start(
+        start, probe, tmp_path):
+    given = ('-p', "connections:=['udpin:127.0.0.1:0']", '-p', f'state_dir:={tmp_path}/bridge')
+    first = start('mavlink_bridge', *given, '-r', '__ns:=/one')
+    probe.until(lambda: 'listens on' in first.output())
+    second = start('mavlink_bridge', *given, '-r', '__ns:=/two')
+    second.popen.wait(90)
+    code, out = second.stop()
+    assert code == 1, out
+    assert f"state_dir = '{tmp_path}/bridge': expected a folder of its own" in out
+    first.stop(signal.SIGKILL)
+    third = start('mavlink_bridge', *given, '-r', '__ns:=/two')
+    probe.until(lambda: 'listens on' in third.output())

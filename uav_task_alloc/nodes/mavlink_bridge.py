@@ -88,6 +88,8 @@ class MavlinkBridge(Node):
         self.lock = threading.Lock()  # of the ground station
         self.store = AuthorityFileStore(params.state_dir, self.log.levels['error'],
                                         boot_id()) if params.state_dir else None
+        if self.store is not None:
+            self.store.lock()
         self.ground_station = GroundStation(
             self.config, random.Random(time.time_ns()), self.store, HoldFileStore(
                 params.state_dir, self.log.levels['error']) if params.state_dir else None,
@@ -293,6 +295,8 @@ class MavlinkBridge(Node):
         self.heartbeat.close()
         self.receiver.join(5.0)
         self.connections.close()
+        if self.store is not None:
+            self.store.close()
         super().destroy_node()
 
 

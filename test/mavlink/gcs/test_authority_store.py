@@ -196,6 +196,18 @@ def test_a_folder_that_cannot_be_created_is_refused_at_the_start(tmp_path, repor
             AuthorityFileStore(str(folder), reports.append)
 
 
+def test_a_folder_is_of_one_bridge_until_that_ends(store, reports):
+    other = AuthorityFileStore(str(store.path('x').parent), reports.append)
+    other.close()  # it has no lock
+    store.lock()
+    with pytest.raises(InvalidValue, match=r'state_dir = .*another bridge that runs has this one'):
+        other.lock()
+    store.close()
+    other.lock()
+    other.close()
+    assert not list(store.path('x').parent.iterdir())
+
+
 def changed(change):
     """A function that changes the JSON body of a file."""
     def rewrite(path):

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 from urllib.parse import quote
 
-from uav_task_alloc.atomic_files import read_file, replace_file, sync_folder
+from uav_task_alloc.atomic_files import lock_folder, read_file, replace_file, sync_folder
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs.authority_state import (
     UNUSABLE,
@@ -76,6 +76,7 @@ class AuthorityFileStore:
         self._unsaved: dict[str, AuthorityRecord] = {}  # by UAV id
         self._saved: dict[str, AuthorityRecord] = {}  # by UAV id; without its position
         self._error = ''  # the write error reported last; '' while all is on disk
+        self._lock: int | None = None
         probe = self._folder / '.probe'
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -84,6 +85,25 @@ class AuthorityFileStore:
         except OSError as error:
             raise InvalidValue('state_dir', folder,
                                f'a folder that can be written to ({error})') from None
+
+    def lock(self) -> None:
+        """Take the folder for this process alone: another fleet's UAVs have the same ids.
+
+        Raises:
+            InvalidValue: another bridge has it.
+        """
+        try:
+            self._lock = lock_folder(self._folder)
+        except BlockingIOError:
+            raise InvalidValue('state_dir', str(self._folder),
+                               'a folder of its own: another bridge that runs has this one, and '
+                               'UAVs with the same id would share a file') from None
+
+    def close(self) -> None:
+        """Leave the folder to another bridge."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
     def path(self, uav_id: str) -> Path:
         """Return the path of a UAV's file.
