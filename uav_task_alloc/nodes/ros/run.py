@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a node until SIGINT or SIGTERM, and shuts it down in order with exit status 0."""
+"""Runs a node until SIGINT, SIGTERM or SIGHUP, and shuts it down in order with exit status 0."""
 from __future__ import annotations
 
 import faulthandler
@@ -62,7 +62,7 @@ def with_flags(argv: list[str], *names: str) -> list[str]:
 
 def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: int = 1,
         params: type[CheckedParams] | None = None) -> None:
-    """Spin `make_node()` until SIGINT or SIGTERM, or until its attribute `finished` is true.
+    """Spin `make_node()` until SIGINT, SIGTERM or SIGHUP, or until its `finished` is true.
 
     A node with a method `delays_exit` is spun on after a signal while that returns True.
     Exit status: 0 in order; 2 and one line for a command line that is invalid; 1 and one line
@@ -78,7 +78,7 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
     # rclpy's own handlers invalidate the context from another thread, and a running callback
     # then raises RCLError. Here the context is valid until the node is destroyed.
     signals: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _end_signals():
         signal.signal(number, lambda *_: signals.append(1))
     name_callers_by_frames()
     # through shared memory a node that was killed and restarted receives nothing for 3 s
@@ -90,10 +90,16 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
         sys.exit(_one_line(error))
     finally:
         faulthandler.dump_traceback_later(_ENDS, file=2)
-        for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not cut this short
+        for number in _end_signals():  # a second Ctrl-C must not cut this short
             signal.signal(number, signal.SIG_IGN)
         rclpy.try_shutdown()
         faulthandler.cancel_dump_traceback_later()
+
+
+def _end_signals() -> list[signal.Signals]:
+    """Those that end a node; SIGHUP, of a terminal that is closed, not under `nohup`."""
+    return [number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN]
 
 
 def _spin(node: Node, threads: int, signals: list[int]) -> None:
