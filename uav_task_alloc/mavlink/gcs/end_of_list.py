@@ -44,11 +44,43 @@ class EndOfList:
         # the list that was not flown for a zone, with the zones then
         self._given_up: tuple[TaskList | None, tuple[ThreatZone, ...]] | None = None
         self.held_at_zone: Callable[[], bool] = lambda: False  # set by the executor
+        self._stopped_at = ''  # the zone before which its return was ended
+        self._zone_found: tuple[object, ThreatZone | None] = None, None
         self._stays = False  # it was, since the mission was reported as complete
 
     def end_hold(self) -> None:
         """The vehicle flies its list: the hold for an upload is over."""
         self._watch.replacing_since, self.alarm = None, ''
+
+    def stop_return(self, now: float) -> NextMessages:
+        """Hold a vehicle that returns by our command before a zone that has come into its way.
+
+        Its list then decides, as where it holds: another way, or a hold until the zone is gone.
+        """
+        telemetry = self._telemetry
+        if telemetry.mode is not ModeFunction.RETURN or not telemetry.airborne or not (
+                self._watch.authority.held and ModeFunction.HOLD in self._profile.set_mode):
+            return None
+        zone = self._zone_on_return()
+        if zone is None:
+            self._stopped_at = ''
+            return None
+        if self._stopped_at != zone.id:
+            self._stopped_at = zone.id
+            self._notes.append(OperatorNote('warning', f'zone {zone.id} has come into its way '
+                                            'home: holds'))
+        return [] if self._sender.backing_off(now) else self._sender.set_mode(
+            ModeFunction.HOLD, now)
+
+    def _zone_on_return(self) -> ThreatZone | None:
+        """The zone that its return is about to enter; zones count without their margins."""
+        telemetry, way_home = self._telemetry, self._onboard.list.way_home
+        if telemetry.home is None or not telemetry.has_position:
+            return None
+        key = telemetry.position_at, way_home.key
+        if self._zone_found[0] != key:
+            self._zone_found = key, way_home.zone_before(telemetry.position, telemetry.home)
+        return self._zone_found[1]
 
     def held_too_long(self, now: float) -> NextMessages:
         """Return home after a too long hold for an upload; stay if a zone is across the path."""

@@ -114,10 +114,11 @@ class MissionExecutor:
                                      self._end_of_list)
         return (
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
-            self.holds.hold, transfers.upload, transfers.read, self._has_list, transfers.resume,
-            self._may_act, self._hold_first, self._end_of_list.held_too_long, self.holds.stay,
-            self._end_of_list.empty, self._end_of_list.given_up, self.fence.clear_way,
-            execution.update_mission, takeoff.take_off, execution.fly)
+            self.holds.hold, self._end_of_list.stop_return, transfers.upload, transfers.read,
+            self._has_list, transfers.resume, self._may_act, self._hold_first,
+            self._end_of_list.held_too_long, self.holds.stay, self._end_of_list.empty,
+            self._end_of_list.given_up, self.fence.clear_way, execution.update_mission,
+            takeoff.take_off, execution.fly)
 
     @property
     def going_home(self) -> bool:

@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.mission.task_list import TaskList
 from uav_task_alloc.model import Point, ThreatZone
 
 _ABOVE_HOME = 1.0  # [m] horizontally: a way that ends there ends with a landing
+_DESCENDS = 5.0  # [m] horizontally from home: a return does not climb any more
 _LEAST_HEIGHT = 5.0  # [m] above home of a level way to it
 
 
@@ -100,6 +101,30 @@ class WayHome:
         if math.isnan(height):
             return zone_across_path(place, home, self.zones())
         return zone_on_return(place, home, height, self.zones())
+
+    def zone_before(self, place: Point, home: Point) -> ThreatZone | None:
+        """Find a zone, without its margin, that a return which is being flown still enters.
+
+        A zone around the vehicle does not count, as its way leads out of it. Above home it only
+        descends.
+
+        Args:
+            place: of the vehicle [m] ENU.
+            home: [m] ENU.
+
+        Returns:
+            The first one; None: the rest of the return is clear.
+        """
+        bare = [replace(zone, margin=0.0) for zone in self.zones()]
+        zones = [zone for zone in bare
+                 if zone_at_heights(place, place, place[2], place[2], (zone,)) is None]
+        if math.dist(place[:2], home[:2]) <= _DESCENDS:
+            low, high = sorted((place[2], home[2]))
+            return zone_at_heights(place, home, low, high, zones)
+        height = self.return_height()
+        if math.isnan(height):
+            return zone_across_path(place, home, zones)
+        return zone_on_return(place, home, height, zones)
 
     def _level_way(self, last: Point, home: Point) -> tuple[Point, ...]:
         """Where it descends, above home; (): there is a zone in that way, too."""
