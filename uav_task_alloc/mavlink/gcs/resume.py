@@ -155,6 +155,7 @@ class Resume:
         replaced = self._find_upload(held)
         if self._passed_recorded and self.recorded[0] == checksum(held):
             self._credit(held[self.recorded[1] or 0:][:1], now)
+        self.current_unreliable |= self._is_mixed(held)
         if self.current_unreliable or (
                 self.was_disarmed and not telemetry.airborne) or (not self._profile.atomic
                 and telemetry.mode is not ModeFunction.MISSION
@@ -228,6 +229,13 @@ class Resume:
         self.recorded, self.passed = (upload[0], upload[1], False), ()
         self._passed_recorded = False  # of the mission that it has replaced
         return True
+
+    def _is_mixed(self, held: tuple[Item, ...]) -> bool:
+        """Whether a part of a replacing upload is on board, below a current item of before it."""
+        (mission, current, _), upload = self.recorded, self.recorded_upload
+        if self._profile.atomic or len(upload) != 2 or checksum(held) in (mission, upload[0]):
+            return False
+        return upload[0] == mission or upload[1] != current  # has failed, or appends nothing
 
     def _continues_recorded(self, held: tuple[Item, ...]) -> bool:
         """Whether the vehicle flies the recorded mission on from the recorded item."""
