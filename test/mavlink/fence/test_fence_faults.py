@@ -249,6 +249,7 @@ def test_require_waits_for_a_verified_fence_that_is_enabled():
     bench.assign(task_list('A'))
     assert bench.run(lambda: 'enabled' in bench.executor().sender.waits_for)
     assert not bench.vehicle.flight.armed
+    assert 'waits for its fence to be enabled: OFF' in bench.state().reason
     bench.from_station(d.MAVLink_param_set_message(1, 1, b'FENCE_ENABLE', 1.0,
                                                    d.MAV_PARAM_TYPE_INT8))
     assert bench.run(lambda: bench.completed() == ['A'])

@@ -133,6 +133,9 @@ def why_not_available(executor: MissionExecutor, now: float) -> str:
         return f'it waits for {TWO_VEHICLES}'
     if executor.alarm:
         return executor.alarm
+    if executor.policy.takeoff and not telemetry.airborne and (
+            need := executor.fence.needs_operator()):
+        return f'it waits for {need}'
     if executor.sender.failing:
         return f'its commands or uploads fail repeatedly: mission {executor.onboard.stored.name}'
     return ''

@@ -229,6 +229,16 @@ class VehicleFence:
             return f'its fence to be enabled: {self.parameters.text}'
         return ''
 
+    def needs_operator(self) -> str:
+        """What of `missing` only an operator provides; '': nothing."""
+        if self._policy().fences != 'require':
+            return ''
+        if self.state in (FenceState.UNSUPPORTED, FenceState.FOREIGN):
+            return f'its fence: {self.text}'
+        if self.verified and self.fence.shapes and self.parameters.enabled is False:
+            return self.missing()
+        return ''
+
     @property
     def text(self) -> str:
         """State of the fence for operators."""
