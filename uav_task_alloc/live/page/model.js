@@ -61,7 +61,8 @@ export function readModel(past) {
     return uav;
   });
   const {orders = [], proposal = null} = parts.orders || {};
-  Object.assign(model, {orders, proposal, nodes: parts.nodes || {silent: null, bridges: {}, warnings: []}});
+  const {nodes = {silent: null, bridges: {}, warnings: []}} = parts;
+  Object.assign(model, {orders, proposal, nodes});
   model.plans = live.plans.filter(plan => plan.wall <= wall);
   model.replans = model.plans.filter(plan => plan.first || plan.changes.length);
   model.events = live.events.filter(event => event.wall <= wall);
