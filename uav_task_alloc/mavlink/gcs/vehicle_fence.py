@@ -230,14 +230,10 @@ class VehicleFence:
         return ''
 
     def needs_operator(self) -> str:
-        """What of `missing` only an operator provides; '': nothing."""
-        if self._policy().fences != 'require':
-            return ''
-        if self.state in (FenceState.UNSUPPORTED, FenceState.FOREIGN):
-            return f'its fence: {self.text}'
-        if self.verified and self.fence.shapes and self.parameters.enabled is False:
-            return self.missing()
-        return ''
+        """What is `missing` where only an operator provides it; '': nothing."""
+        is_off = self.verified and self.fence.shapes and self.parameters.enabled is False
+        needs = is_off or self.state in (FenceState.UNSUPPORTED, FenceState.FOREIGN)
+        return self.missing() if needs else ''
 
     @property
     def text(self) -> str:
