@@ -3,7 +3,7 @@
 import dataclasses
 
 import pytest
-from authority_bench import BOTH, COPTER, H, flying
+from authority_bench import BOTH, COPTER, H, L, S, flying
 from mission_bench import task_list
 
 from uav_task_alloc.geometry.zones import inside
@@ -75,12 +75,25 @@ def test_a_landing_at_home_goes_on_below_a_new_zone(kind):
     assert not any('has come into its way home' in note for note in bench.notes)
 
 
-def test_the_return_of_a_failsafe_is_not_ended_before_a_new_zone():
-    bench = returning('ardupilot')
-    bench.vehicles[1].rc_mode(COPTER.land)
-    bench.vehicles[1].failsafe('battery', COPTER.rtl)
+@BOTH
+@pytest.mark.parametrize('cause', ['battery', 'radio'])
+def test_a_return_that_becomes_one_of_a_failsafe_is_not_ended_before_a_new_zone(kind, cause):
+    bench = returning(kind)
+    vehicle = bench.vehicles[1]
+    vehicle.failsafe(cause, vehicle.flight.custom_mode)
+    assert bench.run(lambda: bench.authority() is S, 3.0)
     bench.set_policy(zones=(WAY,), zones_known=True)
-    bench.run(limit=2.0)
     sent = len(bench.sent)
-    bench.run(limit=30.0)
+    assert bench.run(lambda: not vehicle.flight.armed, 100.0)
+    assert bench.commands(sent) == []
+
+
+def test_the_return_of_a_pilot_is_not_ended_before_a_new_zone():
+    bench = returning('ardupilot')
+    bench.vehicles[1].rc_mode(COPTER.stick)
+    assert bench.reaches(L)
+    bench.vehicles[1].rc_mode(COPTER.rtl)
+    bench.set_policy(zones=(WAY,), zones_known=True)
+    sent = len(bench.sent)
+    assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
     assert bench.commands(sent) == []
