@@ -85,11 +85,23 @@ def test_an_arducopter_without_a_radio_control_sinks_in_a_stick_mode_and_disarms
     assert bench.flight.landed
 
 
+def overriding(throttle):
+    return d.MAVLink_rc_channels_override_message(1, 1, 1500, 1500, throttle, 1500, *[0xffff] * 4)
+
+
+def test_a_throttle_of_a_station_that_is_not_centred_keeps_no_arducopter_up():
+    bench = flying('ardupilot')
+    bench.set_mode(d.COPTER_MODE_LOITER)
+    for _ in range(6):
+        bench.send(overriding(1000))
+        bench.pass_time(1.0)
+    assert bench.flight.body.velocity[2] == pytest.approx(-2.5, abs=0.01)
+
+
 def test_centred_sticks_of_a_station_keep_an_arducopter_up_until_they_end():
     bench = flying('ardupilot')
     bench.set_mode(d.COPTER_MODE_LOITER)
-    sticks = d.MAVLink_rc_channels_override_message(bench.vehicle.config.system_id, 1,
-                                                    *[1500] * 4, *[0xffff] * 4)
+    sticks = overriding(1500)
     for _ in range(20):
         bench.send(sticks)
         bench.pass_time(1.0)

@@ -309,7 +309,7 @@ class VehicleFlight(Navigation):
                 self.set_mode(FlightMode.LAND)
 
     def override_sticks(self) -> None:
-        """Take the sticks, which are centred, from a message of a station where it does so."""
+        """Take centred sticks from a message of a station, where it does so at all."""
 
     def stick_velocity(self) -> Point | None:
         """Velocity [m/s] ENU in a stick mode; None: it hovers."""

@@ -27,6 +27,7 @@ from uav_task_alloc.sim.streams import Streams
 from uav_task_alloc.sim.telemetry import TelemetryMessages
 
 _CURRENT = dialect.MAVLINK_MSG_ID_MISSION_CURRENT
+_CENTRE, _DEAD_ZONE = 1500, 50  # [us] of a stick
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,7 +256,9 @@ class Vehicle(Interventions):
         return out
 
     def _override_sticks(self, m: Message) -> list[Message]:
-        self.flight.override_sticks()
+        sticks = m.chan1_raw, m.chan2_raw, m.chan3_raw, m.chan4_raw
+        if all(abs(pulse - _CENTRE) <= _DEAD_ZONE for pulse in sticks):
+            self.flight.override_sticks()
         return []
 
     def _set_current(self, m: Message) -> list[Message]:
