@@ -144,7 +144,7 @@ class Soak:
 
     def change_zones(self, now: float) -> None:
         """Add or remove one zone."""
-        zones = list(self.world.zones.values())
+        zones = list(self.world.airspace.zones.values())
         self.figures['zones'] += 1
         if len(zones) >= MOST_ZONES or (zones and self.rng.random() < 0.5):
             zones.pop(self.rng.randrange(len(zones)))

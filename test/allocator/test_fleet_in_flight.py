@@ -92,7 +92,8 @@ class SimulatedFleet:
         assert len(ids) == len(set(ids))
         for uav_id in self.alive:
             active = self.active[uav_id]
-            if active and driver.world.tasks.records[active].open and driver.world.zones == {}:
+            if active and driver.world.tasks.records[active].open and (
+                    driver.world.airspace.zones == {}):
                 assert lists[uav_id].task_ids[:1] == (active,)
         changed = [u for u, first in before.items() if lists[u].task_ids[:1] != first and first]
         if problem.background and changed:

@@ -90,8 +90,8 @@ def test_zones_are_announced_stored_and_counted_without_it():
     driver = a_driver()
     zone = ThreatZone.cylinder('z', (100.0, 100.0), 20.0)
     driver.world.set_zones([zone], (), driver.now)
-    assert list(driver.world.zones) == ['z']
-    assert len(driver.world.no_fly_zones()) == 3
+    assert list(driver.world.airspace.zones) == ['z']
+    assert len(driver.world.airspace.no_fly_zones()) == 3
 
 
 def test_an_invalid_area_ends_the_start():

@@ -106,7 +106,7 @@ class BatteryWatch:
         report, known = record.report, self._ways.get(record.report.uav_id)
         if known is not None and not search and now - known[2] < _SEARCH:
             return known[1] + math.dist(report.position, known[0])
-        leg = self._world.paths().leg(report.position, record.home)
+        leg = self._world.airspace.paths().leg(report.position, record.home)
         metres = math.dist(report.position, record.home) if leg is None else leg.length
         self._ways[report.uav_id] = report.position, metres, now
         return metres
@@ -119,7 +119,7 @@ class BatteryWatch:
         if not uav_list.stops or metres is None:
             return False
         first = uav_list.stops[0]
-        length = world.paths().rest(report.position, first.through, first.exit) or 0.0
+        length = world.airspace.paths().rest(report.position, first.through, first.exit) or 0.0
         length += math.fsum(polyline_length((a.exit, *b.line))
                             for a, b in pairwise(uav_list.stops))
         if uav_list.returns:

@@ -202,7 +202,7 @@ def health_values(world: World, solving: bool,
             'UAVs known': len(world.uav_records()),
             'UAVs available': len(world.fleet.usable_ids()),
             BATTERY_RESERVE: world.params.battery_reserve,
-            'zones': len(world.zones), 'revision': world.revision,
+            'zones': len(world.airspace.zones), 'revision': world.revision,
             **{f'tasks {state.name}': states[state] for state in TaskState
                if state is not TaskState.REJECTED},
             'tasks REJECTED': len(world.tasks.rejected), 'tasks late': len(world.deadlines.late),

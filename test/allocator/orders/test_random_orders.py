@@ -194,7 +194,7 @@ class OrdersAndEvents(RuleBasedStateMachine):
             'returns': [orders.returns(uav_id) for uav_id in UAVS],
             'holds': [uav_id in orders.holds and orders.holds[uav_id].hold for uav_id in UAVS],
             'reasons': [orders.reason(name) for name in TASKS],
-            'plan': greedy(uavs, tasks, tuple(world.zones.values())).routes}
+            'plan': greedy(uavs, tasks, tuple(world.airspace.zones.values())).routes}
 
     def kept_by_others(self, uav_id, names):
         """Those of the tasks that a paused UAV keeps: an order that moves them makes them free."""
@@ -206,7 +206,8 @@ class OrdersAndEvents(RuleBasedStateMachine):
 
     def with_tasks(self, demand, more):
         tasks = sorted([*demand['tasks'], *more], key=lambda task: task.id)
-        plan = greedy(demand['uavs'], tasks, tuple(self.driver.world.zones.values())).routes
+        zones = self.driver.world.airspace.zones
+        plan = greedy(demand['uavs'], tasks, tuple(zones.values())).routes
         return {**demand, 'tasks': tasks, 'plan': plan}
 
     @rule(uav_id=st.sampled_from(UAVS), picks=st.lists(PICKS, min_size=1, max_size=2),

@@ -41,7 +41,7 @@ def test_the_world_is_the_same_after_a_restart(rows):
     assert {t.task.id: t.state.name for t in before.tasks} == {
         't1': 'COMPLETED', 't2': 'ASSIGNED', 't3': 'CANCELLED', 't4': 'UNASSIGNED',
         't5': 'ASSIGNED'}
-    assert tuple(after.world.zones.values()) == ZONES
+    assert tuple(after.world.airspace.zones.values()) == ZONES
     assert after.world.fleet.switched_off == {'b'}
     assert after.core.rows() == []
 

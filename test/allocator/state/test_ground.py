@@ -112,7 +112,7 @@ def test_a_zone_over_the_ridge_is_flown_around_above_the_ground():
     driver.add(HUT)
     driver.settle()
     points, = legs(driver)
-    assert driver.world.paths().clear(*points)
+    assert driver.world.airspace.paths().clear(*points)
     check_clear(driver)
 
 

@@ -76,7 +76,7 @@ def test_the_same_zones_again_change_nothing(driver):
 
 def test_a_zone_whose_new_form_is_bad_stays_as_it_was(driver):
     driver.world.set_zones([], {'dome': 'radius = -1'}, driver.now)
-    assert driver.world.zones == {'dome': DOME}
+    assert driver.world.airspace.zones == {'dome': DOME}
 
 
 def test_a_zone_over_a_task_leaves_it_out_with_the_reason(driver):

@@ -44,7 +44,7 @@ def rows(world: World, state: object, most: int | None = None) -> list[JournalRo
     seen = world.announced.seen.blocks
     changed += [JournalRow('demand', number, seen.get(number))
                 for number in sorted(unsaved['demand'])]
-    make = {'zones': lambda: zones_row(world.zones.values()),
+    make = {'zones': lambda: zones_row(world.airspace.zones.values()),
             'off': lambda: off_row(world.fleet.switched_off),
             'revision': lambda: revision_row(world.revision),
             'proposal': lambda: proposal_row(world.proposal),

@@ -134,7 +134,7 @@ def _build_accepted(world: World, built: BuiltLists, each: UavList, task_ids: tu
     unreachable: Mapping[str, str] = build_list(
         world, built, each.uav, tasks, returns, legs_of_list(each), stamp, backward,
         replace(each, stops=tuple(rest)))
-    built.zones_when_built[each.uav] = world.paths(), world.uav_records()[each.uav].home
+    built.zones_when_built[each.uav] = world.airspace.paths(), world.uav_records()[each.uav].home
     return next((f'{task_id}: {why}' for task_id, why in unreachable.items()), '')
 
 

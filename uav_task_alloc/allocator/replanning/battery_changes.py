@@ -111,7 +111,7 @@ class BatteryChanges:
         for uav_id in sorted(left, key=left.__getitem__):
             uav, home = world.uav(uav_id), world.uav_records()[uav_id].home
             stop = stay * uav.cruise_speed
-            if world.paths().leg(uav.position, home) is None:
+            if world.airspace.paths().leg(uav.position, home) is None:
                 continue
             here = _able(places, weight, uav.position, home, self._waiting.metres(uav_id) - stop)
             full = _able(places, weight, home, home, (uav.full_range or 0.0) - stop)

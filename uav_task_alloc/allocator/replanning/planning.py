@@ -86,7 +86,7 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
     return ReplanProblem(
         world.version, trigger, background,
         params.background_budget if background else params.solve_budget, uavs,
-        tasks, world.no_fly_zones(), locked,
+        tasks, world.airspace.no_fly_zones(), locked,
         published=with_later_trips(replace(best, routes=routes, legs=legs, reversed=frozenset(
             stop.task.id for each in published.values() for stop in each.stops
             if stop.reversed and stop.task.id not in under_way)), world),
@@ -248,7 +248,7 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
             continue
         unreachable = build_list(world, built, uav_id, tasks, home, legs, stamp, backward)
         built.left_out.update(unreachable)
-        built.zones_when_built[uav_id] = world.paths(), world.uav_records()[uav_id].home
+        built.zones_when_built[uav_id] = world.airspace.paths(), world.uav_records()[uav_id].home
     for each in world.ordered.sequences(returns).values():
         built.left_out.update(dict.fromkeys(each.left_out, each.why))
     # unknown UAVs, too: one that returns must not fly what others have
@@ -269,7 +269,7 @@ def way_to_place_is_clear(world: World, each: UavList) -> bool:
         False also where the UAV is not known.
     """
     record, place = world.uav_record(each.uav), each.waiting_place
-    return record is not None and place is not None and world.paths().rest_of_leg(
+    return record is not None and place is not None and world.airspace.paths().rest_of_leg(
         record.report.position, Leg(each.end_via[:-1], 0.0), place,
         record.report.velocity) is not None
 
@@ -295,7 +295,7 @@ def build_list(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Tas
     """
     uav, keep = world.uav(uav_id), approved is not None or separation_of(world.params).on
     new, unreachable = build_task_list(uav, tasks, returns, legs,
-                                       approved or world.list_of(uav_id), world.paths(),
+                                       approved or world.list_of(uav_id), world.airspace.paths(),
                                        world.flights.of(uav_id, stamp), keep, backward)
     end = new.stops[-1].exit if new.stops else uav.position
     built.lists[uav_id] = new

@@ -239,7 +239,7 @@ def _metres(world: World, each: UavList) -> float:
     if not each.stops or record is None:
         return 0.0
     first = each.stops[0]
-    rest = world.paths().rest(record.report.position, first.through, first.exit)
+    rest = world.airspace.paths().rest(record.report.position, first.through, first.exit)
     return each.distance if rest is None else each.distance - first.length + rest
 
 

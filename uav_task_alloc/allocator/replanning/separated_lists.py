@@ -51,7 +51,7 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
         most = min(most, round(_CHANGES * params.solve_budget))
     limits = TransitLimits(
         params.altitude_min, params.altitude_max,
-        lambda points: world.paths().leg_clear(*points), lambda: next(tried) >= most,
+        lambda points: world.airspace.paths().leg_clear(*points), lambda: next(tried) >= most,
         _DEAREST)
     found = resolve(list(flights.values()), separation_of(params), limits)
     changed = {each.uav: each for each in found.flights}
@@ -92,7 +92,7 @@ def _with_high_return(world: World, each: UavList) -> UavList:
         return each
     home, last = record.home, (each.stops[-1].exit, *each.end_via)[-1]
     above = home[0], home[1], last[2]
-    if last[2] <= home[2] or last[:2] == home[:2] or not world.paths().leg_clear(
+    if last[2] <= home[2] or last[:2] == home[:2] or not world.airspace.paths().leg_clear(
             last, above, home):
         return each
     return replace(each, end_via=(*each.end_via, above))

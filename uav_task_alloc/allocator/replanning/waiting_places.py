@@ -165,8 +165,8 @@ class WaitingPlaces:
         if past < _LEAST_REVIEW or not self.on or world.restart_hold or not world.kernels_ready:
             return {}
         idle = self.idle()
-        event = (tuple(idle), world.announced.seen.version, world.plan_revision, world.paths(),
-                 world.params.anticipate)
+        event = (tuple(idle), world.announced.seen.version, world.plan_revision,
+                 world.airspace.paths(), world.params.anticipate)
         if past < _REVIEW and event == self._event:
             return {}
         self._chosen_at, self._event = now, event
@@ -197,7 +197,7 @@ class WaitingPlaces:
         choice.demand.follow(world.announced.seen, world.params)
         places = choice.places(world.params.anticipate == 'learnt', {
             uav_id: (self._height(uav_id), *self._reach(uav_id)) for uav_id in idle},
-            self._others(idle, stamp), self._present(idle), world.paths(), stamp)
+            self._others(idle, stamp), self._present(idle), world.airspace.paths(), stamp)
         for uav_id, place in places.items():
             each = self.list_to(uav_id, place)
             why = (self.why_out_of_reach(each) if each is not None else 'no safe way') or (
@@ -272,13 +272,13 @@ class WaitingPlaces:
         up = (start[0], start[1], place[2])
         climb = (up,) if abs(up[2] - start[2]) > _CLIMB else ()
         begin = climb[0] if climb else start
-        leg = world.paths().leg(begin, place)
+        leg = world.airspace.paths().leg(begin, place)
         if leg is None:
             return None
         via = leg.via
         while via and math.dist(via[-1][:2], place[:2]) < _UPRIGHT and via[-1][2] > place[2]:
             via, place = via[:-1], via[-1]  # no descent at the end: the ground may be there
-        if not world.paths().leg_clear(start, *climb, *via, place):
+        if not world.airspace.paths().leg_clear(start, *climb, *via, place):
             return None
         return replace(world.list_of(uav_id), end_via=(*climb, *via, place), distance=0.0)
 
@@ -291,7 +291,7 @@ class WaitingPlaces:
         """
         world, record = self._world, self._world.uav_records()[each.uav]
         place = each.end_via[-1]
-        home = world.paths().leg(place, record.home)
+        home = world.airspace.paths().leg(place, record.home)
         if home is None:
             return 'no safe way home from its place'
         way = polyline_length((record.report.position, *each.end_via))

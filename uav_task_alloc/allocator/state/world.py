@@ -18,19 +18,20 @@ from uav_task_alloc.allocator.records import (
     UavReport,
 )
 from uav_task_alloc.allocator.state.admission import Admission
+from uav_task_alloc.allocator.state.airspace import Airspace
 from uav_task_alloc.allocator.state.announcements import Announcements
 from uav_task_alloc.allocator.state.callbacks import RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
 from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord, jump_distance, replan_reasons
 from uav_task_alloc.allocator.state.flights import Flights
-from uav_task_alloc.allocator.state.ground import Ground, area_zones
+from uav_task_alloc.allocator.state.ground import Ground
 from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
 from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
 from uav_task_alloc.allocator.state.missed_completions import MissedCompletions
 from uav_task_alloc.allocator.state.ordered_tasks import OrderedTasks
 from uav_task_alloc.allocator.state.orders import Orders
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
-from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths, SafePaths
+from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths
 from uav_task_alloc.allocator.state.seen_tasks import SeenTasks
 from uav_task_alloc.allocator.state.task_events import TaskEvents
 from uav_task_alloc.allocator.state.task_state_machine import TaskStep
@@ -79,15 +80,14 @@ class World:
     def __init__(self, params: AllocatorParams, saved: SavedState,
                  make_safe_paths: MakeSafePaths, on_change: RequestReplan,
                  terrain: Terrain | None = None) -> None:
-        self.params, self._make_safe_paths, self._on_change = params, make_safe_paths, on_change
+        self.params, self._on_change = params, on_change
         # of the allocation; and the first one with the lists in force
         self.revision = self.plan_revision = saved.revision
         self.version, self.outbox, self.proposal = 0, Outbox(), saved.proposal
-        self.zones, self._outside = {each.id: each for each in saved.zones}, area_zones(params)
+        self.airspace = Airspace(saved.zones, lambda: self.params, make_safe_paths)
+        paths = self.airspace.paths
         self.restart_hold = any(each.stops for each in saved.lists)  # no task changes its UAV
         self.kernels_ready = False  # compiled: checks of zones are fast
-        self._paths: SafePaths | None = None
-        self._paths_params = params
         self._kept = -1, -1  # `keep_ended`, and how many had ended when it was applied
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
@@ -98,15 +98,14 @@ class World:
             if record.state is TaskState.ACTIVE}, self.orders, saved.change_from)
         self.lists = PublishedLists(saved.lists, (record.task.id for record in saved.tasks))
         self.flights = Flights(self.fleet, self.lists, lambda: self.params)
-        self.ordered = OrderedTasks(self.tasks, self.flights, self.fleet, self.lists, self.paths,
+        self.ordered = OrderedTasks(self.tasks, self.flights, self.fleet, self.lists, paths,
                                     self.uav)
-        self._validity = ListValidity(self.tasks, self.fleet, self.lists, self.paths,
-                                      self.ordered)
+        self._validity = ListValidity(self.tasks, self.fleet, self.lists, paths, self.ordered)
         self.deadlines = Deadlines(self.tasks, self.fleet, self.flights)
-        self.zone_checks = ZoneChecks(self.fleet, self.lists, self.paths, self.note,
+        self.zone_checks = ZoneChecks(self.fleet, self.lists, paths, self.note,
                                       self.request_replan)
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
-        self.ground = Ground(terrain, self.no_fly_zones, lambda: self.params)
+        self.ground = Ground(terrain, self.airspace.no_fly_zones, lambda: self.params)
         self.works = Works(self.tasks, saved.works, self.ground.cut, self.deadlines.refusal)
         self.lists.forget_tasks({each.task.id for each in saved.tasks} - {*self.tasks.records})
         seen = SeenTasks(saved.seen_tasks.items(), lambda: self.params.anticipate != 'off')
@@ -187,12 +186,9 @@ class World:
 
     def set_zones(self, zones: Sequence[ThreatZone], bad: Collection[str], now: float) -> None:
         """Replace all zones; those whose ids are in `bad` (refused) stay as they were."""
-        new = {zone_id: zone for zone_id, zone in self.zones.items() if zone_id in bad}
-        new.update((zone.id, zone) for zone in zones)
-        if new == self.zones:
+        changed = self.airspace.replace(zones, bad)
+        if not changed:
             return
-        changed = [i for i in {**self.zones, **new} if self.zones.get(i) != new.get(i)]
-        self.zones, self._paths = new, None
         self.mark_unsaved('zones')
         self.zone_checks.zones_changed()
         self.note(f'zones changed: {first_of(changed)}')
@@ -266,17 +262,6 @@ class World:
             self._kept = keep, len(self.tasks.ended)
 
     # questions of the planner
-
-    def paths(self) -> SafePaths:
-        """Return the paths around the present zones."""
-        if self._paths is None or self._paths_params is not self.params:
-            self._paths_params = self.params
-            self._paths = self._make_safe_paths(self.no_fly_zones(), self.params)
-        return self._paths
-
-    def no_fly_zones(self) -> tuple[ThreatZone, ...]:
-        """Return the present zones, and those that cover what is outside of `fence_area`."""
-        return (*self.zones.values(), *self._outside)
 
     def task_records(self) -> Mapping[str, TaskRecord]:
         """Return the accepted tasks, by id."""

@@ -110,7 +110,8 @@ class MarkerPublisher:
         """Whether the published markers are out of date."""
         moved = (now - self.published_at >= POSITION_PERIOD
                  and self.published_positions != self.positions())
-        return self.changed or moved or list(self.world.zones.values()) != self.published_zones
+        zones = list(self.world.airspace.zones.values())
+        return self.changed or moved or zones != self.published_zones
 
     def positions(self) -> dict[str, Point]:
         """Last reported positions of the UAVs [m]."""
@@ -121,7 +122,7 @@ class MarkerPublisher:
         """Publish all markers."""
         world = self.world
         self.changed, self.published_at = False, now
-        self.published_zones = list(world.zones.values())
+        self.published_zones = list(world.airspace.zones.values())
         self.published_positions = self.positions()
         self.publisher.publish(markers(MarkerScene(
             self.node.get_clock().now().nanoseconds * 1e-9, list(world.lists_in_force().values()),
