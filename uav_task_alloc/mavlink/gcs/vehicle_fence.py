@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps the fence on board of one vehicle true to the zones: when it is chosen and transferred.
+"""Keeps the fence on board of one vehicle true to the zones: when it is transferred, and reported.
 
 A mission comes first: no transfer of a fence begins while one of the mission runs, and it is
 cancelled for one. Only a plan that passes where the fence on board forbids it waits for the fence.
@@ -17,23 +17,22 @@ from uav_task_alloc.errors import first_of
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.geometry.zones_on_path import zones_across_path
 from uav_task_alloc.mavlink.autopilots import Profile
-from uav_task_alloc.mavlink.fence.choice import Fence, FlightSpace, choose_fence
+from uav_task_alloc.mavlink.fence.choice import Fence
 from uav_task_alloc.mavlink.fence.fence_parameters import FenceParameters
 from uav_task_alloc.mavlink.fence.onboard_fence import FenceState, ItemKey, OnboardFence
 from uav_task_alloc.mavlink.fence.rally import rally_alike
-from uav_task_alloc.mavlink.fence.shapes import fence_items, shapes_of_items, vertical_extent
+from uav_task_alloc.mavlink.fence.shapes import vertical_extent
 from uav_task_alloc.mavlink.gcs.authority import Authority, SendAction
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.rally_transfer import RALLY_BUDGET, RallyTransfer
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
-from uav_task_alloc.mavlink.mission.items import Item
+from uav_task_alloc.mavlink.gcs.wanted_fence import WantedFence
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
-from uav_task_alloc.model import Point, ThreatZone
+from uav_task_alloc.model import ThreatZone
 
-_PERIOD = 1.0  # [s] between choices
 _SETTLED = 2.0  # [s] in the air without a change of the wanted fence: the new list comes first
 _MOST_FAILURES = 3  # transfers until a plan no longer waits for the fence
 
@@ -67,7 +66,7 @@ class VehicleFence:
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
                  onboard: OnboardMission, authority: Authority, policy: Callable[[], Policy],
                  rng: random.Random, memory: FenceMemory) -> None:
-        self._origin, self._telemetry, self._onboard = origin, telemetry, onboard
+        self._telemetry, self._onboard = telemetry, onboard
         self._authority, self._policy = authority, policy
         fence_peer = replace(peer, mission_type=d.MAV_MISSION_TYPE_FENCE)
         self._own: dict[str, frozenset[ItemKey]] = {}  # items of the bridge, by store
@@ -83,13 +82,10 @@ class VehicleFence:
         way_home.zones = self._zones_to_avoid
         way_home.return_height = self.parameters.known_return_height
         self.notes: deque[OperatorNote] = deque()
-        self.fence = Fence()
-        self._chosen_for: object = None
-        self._choose_at = self._changed_at = -1e9  # [s]
+        self._wanted = WantedFence(origin, telemetry, onboard, policy, self.parameters,
+                                   self.transfer)
         self._reported = ''
         self._was_verified = False
-        self._blocks_for: tuple[FlightSpace, tuple[tuple[Item, ...], ...]] | None = None
-        self._is_blocked = False  # the answer of `_blocks` for that
 
     def _save(self, store: str, own: frozenset[ItemKey], memory: FenceMemory) -> None:
         self._own[store] = own
@@ -108,6 +104,11 @@ class VehicleFence:
             self._was_verified = False
         around = self._was_verified and self.parameters.plans_around and not self.left_out
         return () if around else policy.no_fly_zones
+
+    @property
+    def fence(self) -> Fence:
+        """The fence that it is to carry."""
+        return self._wanted.fence
 
     @property
     def active(self) -> bool:
@@ -152,7 +153,7 @@ class VehicleFence:
             return self.transfer.cancel() + self.rally.transfer.cancel()
         out: list[Message] = []
         if self.active and not self.rally.transfer.busy:
-            self._choose(now)
+            self._wanted.choose(now)
             out = self._transfer(now)
             self._report()
         if self._policy().rally and not self.transfer.busy:
@@ -191,8 +192,8 @@ class VehicleFence:
             return self.transfer.cancel()
         if self.transfer.busy:
             return out + self.transfer.step(now)
-        settled = not self._telemetry.airborne or now - self._changed_at >= _SETTLED or (
-            self._blocks())
+        settled = not self._telemetry.airborne or (
+            now - self._wanted.changed_at >= _SETTLED) or self._wanted.is_entered()
         return out + self.transfer.begin(
             now, settled and self._may_upload and self._policy().zones_known)
 
@@ -206,8 +207,8 @@ class VehicleFence:
         """A rule: wait where the list passes through a fence on board that is being changed."""
         if not self.active:
             return None
-        self._choose(now, at_once=True)
-        if not self._blocks() or self.transfer.failures >= _MOST_FAILURES or (
+        self._wanted.choose(now, at_once=True)
+        if not self._wanted.is_entered() or self.transfer.failures >= _MOST_FAILURES or (
                 not self._may_upload):
             return None
         return []
@@ -311,78 +312,6 @@ class VehicleFence:
         if text != self._reported:
             self._reported = text
             self.notes.append(OperatorNote('warning' if self.warning else 'info', text))
-
-    # the choice
-
-    def _choose(self, now: float, at_once: bool = False) -> None:
-        policy, telemetry = self._policy(), self._telemetry
-        if (now < self._choose_at and not at_once) or not (
-                telemetry.has_position and policy.zones_known):
-            return
-        key = self._key(policy)
-        if key == self._chosen_for and (not self.fence.waiting or now < self._choose_at):
-            return
-        self._choose_at = now + _PERIOD
-        space = self._space()
-        self._chosen_for = key
-        carried = self.fence.shapes if self.verified else ()
-        self.fence = choose_fence(policy.zones, policy.fence_area, space, self.transfer.budget,
-                                  self._origin, carried)
-        wanted = fence_items(self.fence.shapes, self._origin)
-        if wanted != self.transfer.wanted:
-            self.transfer.wanted, self._changed_at = wanted, now
-
-    def _key(self, policy: Policy) -> object:
-        telemetry, onboard = self._telemetry, self._onboard
-        return (policy.zones, policy.fence_area, policy.cruise_altitude, telemetry.home,
-                telemetry.airborne, onboard.tasks, len(onboard.progress.completed),
-                onboard.progress.items, onboard.progress.current, self.transfer.budget,
-                self.parameters.return_height, self.parameters.plans_around, self._returns,
-                self.verified)
-
-    def _space(self) -> FlightSpace:
-        """Where the vehicle flies: its list, the mission on board, home, and the heights."""
-        telemetry, policy = self._telemetry, self._policy()
-        home = telemetry.home or telemetry.position
-        start = telemetry.position if telemetry.airborne else home
-        planned = self._planned()
-        onboard = self._onboard.progress
-        flown = [item.position for item in onboard.items[onboard.current or 0:]
-                 if item.position is not None] if telemetry.airborne else []
-        rise = home[2] + max(policy.cruise_altitude, self.parameters.return_height)
-        heights = [p[2] for p in (*planned, *flown)] or [rise]
-        # a vehicle that flies around its fence does not return straight
-        ends = (home,) if self._returns and not self.parameters.plans_around else ()
-        return FlightSpace(
-            ((start, *planned, *ends), (start, *flown), (home,)), min(heights),
-            max(*heights, rise), telemetry.position if telemetry.airborne else None)
-
-    @property
-    def _returns(self) -> bool:
-        """Whether its list ends with a return."""
-        return self._onboard.tasks is not None and self._onboard.remaining().returns
-
-    def _planned(self) -> list[Point]:
-        """The points of the list that are still to be flown."""
-        onboard = self._onboard
-        if onboard.tasks is None:
-            return []
-        tasks = onboard.remaining()
-        points = [p for stop in tasks.stops for p in (*stop.via, *stop.way)]
-        return points + list(tasks.tail)
-
-    def _blocks(self) -> bool:
-        """Whether the list passes where the fence on board forbids it, and is to be changed."""
-        transfer = self.transfer
-        if self.verified or transfer.wanted is None or (
-                transfer.held is not None and not transfer.is_own):
-            return False
-        key = replace(self._space(), position=None), transfer.possible
-        if key != self._blocks_for:  # else as at the messages before
-            self._blocks_for = key
-            self._is_blocked = any(key[0].enters(shape) for items in key[1]
-                                   for shape in shapes_of_items(items, self._origin))
-        return self._is_blocked
 
 
 def _joined_reasons(reasons: Mapping[str, str]) -> str:
