@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import fcntl
 import os
+import secrets
+import shutil
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -29,6 +33,41 @@ def replace_file(path: Path, text: str) -> None:
         temporary.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Within `with`, a result is written beside a file, which it replaces once it is complete.
+
+    A link, a pipe and a device are written themselves, as is a file in a folder in which no
+    other one can be made. Nothing is synced to disk.
+
+    Args:
+        path: of the file; where `with` is left by an exception, it stays as it was.
+
+    Returns:
+        The file to write; its suffix is that of the path.
+
+    Raises:
+        OSError: the file cannot be replaced.
+    """
+    if path.is_symlink() or not _writable(path.parent) or (
+            path.exists() and not (path.is_file() and _writable(path))):
+        yield path
+        return
+    temporary = path.with_name(f'.uav_task_alloc_{secrets.token_hex(4)}{path.suffix}')
+    try:
+        yield temporary
+        if path.exists():
+            shutil.copymode(path, temporary)
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _writable(path: Path) -> bool:
+    return os.access(path, os.W_OK, effective_ids=True)
 
 
 def read_file(path: Path, limit: int) -> str:

@@ -2,6 +2,7 @@
 """Outputs and packages are checked before a command computes; an error names the option."""
 import importlib.util
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -10,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from uav_task_alloc import __main__ as cli
-from uav_task_alloc.cli import outputs
+from uav_task_alloc.atomic_files import replacing
+from uav_task_alloc.cli import outputs, plan
 
 ROOT = Path(__file__).parents[2]
 FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
@@ -156,6 +158,77 @@ def test_a_full_disk_names_the_option(option, tmp_path):
     assert done.stderr == (f"{option[0]} = '{option[1]}': expected a place that can be written: "
                            'No space left on device\n')
     assert '5 tasks planned' in done.stdout
+
+
+@pytest.fixture
+def small_disk(monkeypatch):
+    """Once it is called, files that `plan` writes may have 200 bytes; Python caches no modules."""
+    write = plan.write_outputs
+
+    def limited(*arguments):
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200, before[1]))
+        try:
+            write(*arguments)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    monkeypatch.setattr(sys, 'dont_write_bytecode', True)
+    return lambda: monkeypatch.setattr(plan, 'write_outputs', limited)
+
+
+@pytest.mark.parametrize(('option', 'name'), [
+    ('--json', 'plan.json'), ('--plot', 'map.png'), ('--plot-3d', 'map.svg'),
+    ('--plot-times', 'map.pdf'), ('--map', 'map.kml'), ('--map', 'map.geojson'),
+    ('--map', 'map.plan'), ('--missions', 'scout.plan')])
+def test_a_result_that_does_not_fit_leaves_the_file_as_it_was(
+        option, name, small_disk, tmp_path, capsys):
+    path = tmp_path / name
+    given = tmp_path if option == '--missions' else path
+    arguments = ['plan', FILE, '--budget', '0.02', option, str(given)]
+    assert cli.main(arguments) == 0  # what it imports and compiles is in files
+    for each in tmp_path.iterdir():
+        each.write_text('of before')
+    before = sorted(tmp_path.iterdir())
+    small_disk()
+    assert cli.main(arguments) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"{option} = '{given}': expected a place that can be written: File too large")
+    assert path.read_text() == 'of before'
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_result_keeps_the_mode_of_the_file_that_it_replaces(tmp_path):
+    path = tmp_path / 'plan.json'
+    path.write_text('old')
+    path.chmod(0o640)
+    with replacing(path) as file:
+        file.write_text('new')
+        assert path.read_text() == 'old'
+    assert (path.read_text(), path.stat().st_mode & 0o777) == ('new', 0o640)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_link_stays_a_link_to_the_file_that_is_written(tmp_path):
+    (tmp_path / 'link.json').symlink_to('plan.json')
+    with replacing(tmp_path / 'link.json') as file:
+        file.write_text('new')
+    assert (tmp_path / 'link.json').is_symlink()
+    assert (tmp_path / 'plan.json').read_text() == 'new'
+
+
+def test_a_file_in_a_folder_that_is_read_only_is_written(read_only_folder):
+    user = os.geteuid()
+    if user == NOBODY:  # the fixture is root otherwise
+        os.seteuid(0)
+    path = read_only_folder / 'plan.json'
+    read_only_folder.chmod(0o755)
+    path.write_text('old')
+    path.chmod(0o666)
+    read_only_folder.chmod(0o555)
+    os.seteuid(user)
+    with outputs.writing('--json', path) as file:
+        file.write_text('new')
+    assert path.read_text() == 'new'
 
 
 def test_a_full_disk_for_the_printed_plan_is_one_line():

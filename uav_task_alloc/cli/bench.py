@@ -24,7 +24,7 @@ from uav_task_alloc.cli.outputs import (
     check_file,
     check_folder,
     check_installed,
-    naming,
+    writing,
 )
 from uav_task_alloc.cli.progress import log_line
 from uav_task_alloc.errors import InvalidValue
@@ -68,13 +68,13 @@ def main(argv: Sequence[str]) -> int:
         log_line(text)
     print(gap_table(runs))
     if args.json:
-        with naming('--json', args.json):
-            args.json.write_text(json.dumps({key: run.plain() for key, run in runs.items()},
-                                            indent=1, allow_nan=False) + '\n')
+        with writing('--json', args.json) as file:
+            file.write_text(json.dumps({key: run.plain() for key, run in runs.items()},
+                                       indent=1, allow_nan=False) + '\n')
     if args.plot:
         from uav_task_alloc.study.gap_plot import draw_gaps  # imports matplotlib
-        with naming('--plot', args.plot):
-            draw_gaps(runs, args.plot)
+        with writing('--plot', args.plot) as file:
+            draw_gaps(runs, file)
     return int(bool(outcome.failed))
 
 

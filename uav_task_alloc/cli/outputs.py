@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from uav_task_alloc.atomic_files import replacing
 from uav_task_alloc.errors import AllocError, InvalidValue
 
 FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
@@ -99,6 +100,24 @@ def naming(option: str, path: Path) -> Iterator[None]:
     except OSError as error:
         raise InvalidValue(option, str(path), 'a place that can be written: '
                            f'{error.strerror or error}') from None
+
+
+@contextmanager
+def writing(option: str, path: Path) -> Iterator[Path]:
+    """Within `with`, the file of an option is written, complete or not at all.
+
+    Args:
+        option: for errors: `--json`.
+        path: of the option.
+
+    Returns:
+        The file to write, which replaces that of the option at the end.
+
+    Raises:
+        InvalidValue: it cannot be written; the old content stays.
+    """
+    with naming(option, path), replacing(path) as file:
+        yield file
 
 
 def _try_to_write(path: Path) -> None:

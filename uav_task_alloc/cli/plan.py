@@ -22,6 +22,7 @@ from uav_task_alloc.cli.outputs import (
     check_folder,
     check_installed,
     naming,
+    writing,
 )
 from uav_task_alloc.cli.plan_json import plan_json
 from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
@@ -277,27 +278,27 @@ def write_outputs(loaded: Scenario, result: Plan, args: argparse.Namespace) -> N
     """Write JSON, figures and mission files.
 
     Raises:
-        InvalidValue: a file cannot be written; those before it are.
+        InvalidValue: a file cannot be written and stays as it was; those before it are written.
     """
     if args.json:
-        with naming('--json', args.json):
-            args.json.write_text(
+        with writing('--json', args.json) as file:
+            file.write_text(
                 json.dumps(plan_json(loaded, result), indent=2, allow_nan=False) + '\n')
     for option, path, name in (('--plot', args.plot, 'draw_plan'),
                                ('--plot-3d', args.plot_3d, 'draw_plan_3d'),
                                ('--plot-times', args.plot_times, 'draw_plan_times')):
         if path:
             from uav_task_alloc import plots  # imports matplotlib
-            with naming(option, path):
+            with writing(option, path) as file:
                 getattr(plots, name)(
                     [uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
-                    [timed.zone for timed in loaded.zones], result, path,
+                    [timed.zone for timed in loaded.zones], result, file,
                     fence_area=loaded.fence_area)
     if args.map and args.map.suffix.lower() == '.plan':
         from uav_task_alloc.map_files.write_plan import plan_document
-        with naming('--map', args.map):
-            document, notes = plan_document(loaded)
-            args.map.write_text(json.dumps(document, indent=2, allow_nan=False) + '\n')
+        document, notes = plan_document(loaded)
+        with writing('--map', args.map) as file:
+            file.write_text(json.dumps(document, indent=2, allow_nan=False) + '\n')
         for note in notes:
             log_line(f'Warning: {args.map.name}: {note}')
     elif args.map:

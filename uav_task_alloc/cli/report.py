@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from uav_task_alloc.cli.options import OptionParser
-from uav_task_alloc.cli.outputs import MAP_SUFFIXES, check_file, check_installed, naming
+from uav_task_alloc.cli.outputs import MAP_SUFFIXES, check_file, check_installed, naming, writing
 from uav_task_alloc.cli.progress import log_line
 from uav_task_alloc.errors import AllocError, InvalidValue, damage
 from uav_task_alloc.geometry.fence_area import zones_outside
@@ -205,8 +205,8 @@ def flight_page(bag: Path, html: Path, flown: Path | None, namespace: str | None
     check_file('--html', html, inputs=[bag])
     check_file('--map', flown, MAP_SUFFIXES, [bag, html])
     from uav_task_alloc.flight_report import page  # imports plotly and mcap
-    with naming('--html', html):
-        history, warnings = page.write_report(bag, html, namespace)
+    with writing('--html', html) as file:
+        history, warnings = page.write_report(bag, file, namespace)
     for name, value in page.key_figures(history):
         print(f'{name:<45}{"" if value is None else value!s:>12}')
     for text in warnings:
@@ -272,8 +272,8 @@ def demo_table(place: Path, flown: Path | None) -> int:
         check_installed('report', 'matplotlib')
         check_file('map', png)
         from uav_task_alloc.plots import draw_flight  # imports matplotlib
-        with naming('map', png):
-            draw_flight(out, png)
+        with writing('map', png) as file:
+            draw_flight(out, file)
     except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError,
             ValueError) as error:
         if isinstance(error, AllocError):

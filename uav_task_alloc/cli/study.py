@@ -12,9 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from uav_task_alloc.atomic_files import replacing
 from uav_task_alloc.cli.interrupt import INTERRUPTED, resumable
 from uav_task_alloc.cli.options import OptionParser, add_executor_options, size
-from uav_task_alloc.cli.outputs import check_folder, check_installed
+from uav_task_alloc.cli.outputs import check_folder, check_installed, naming
 from uav_task_alloc.cli.progress import log_line
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.study import campaign, executors, experiments, tables
@@ -81,7 +82,8 @@ def regenerate(settings: Experiments, out: Path, open_executor: campaign.Executo
         outcome, status = campaign.load_results(jobs, folder), INTERRUPTED
         log_line(f'interrupted with {len(outcome.results)} of {len(jobs)} results; '
                  'the same command continues from here')
-    return write_study(settings, outcome, out) or status
+    with naming('--out', out):
+        return write_study(settings, outcome, out) or status
 
 
 def write_study(settings: Experiments, outcome: CampaignOutcome, out: Path) -> int:
@@ -93,12 +95,14 @@ def write_study(settings: Experiments, outcome: CampaignOutcome, out: Path) -> i
     for name, (quality, timing) in pairs.items():
         tables.write_csv(out / f'table_{name}.csv', quality)
         tables.write_csv(out / f'table_{name}_timing.csv', timing)
-    (out / 'settings.json').write_text(json.dumps(asdict(settings), indent=1) + '\n')
+    with replacing(out / 'settings.json') as file:
+        file.write_text(json.dumps(asdict(settings), indent=1) + '\n')
     for i, (file_name, head) in enumerate((('tables.md', _TABLES_HEAD),
                                            ('timing.md', _TIMING_HEAD))):
-        (out / file_name).write_text(head + ''.join(
-            f'\n## {title}\n\n{tables.markdown(pairs[name][i])}\n'
-            for name, title in _TITLES.items()))
+        with replacing(out / file_name) as file:
+            file.write_text(head + ''.join(
+                f'\n## {title}\n\n{tables.markdown(pairs[name][i])}\n'
+                for name, title in _TITLES.items()))
     for name, reason in outcome.failed.items():
         log_line(f'{name} failed: {reason}')
     log_line(f'figures and tables: {out}')

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from uav_task_alloc.atomic_files import replacing
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.geometry.polygon import XY
 from uav_task_alloc.model import Plan, Point, Shape, Task, ThreatZone
@@ -150,7 +151,8 @@ def write_map(path: Path, origin: Origin, shapes: Iterable[MapShape]) -> None:
     """
     rows = [(shape, _degrees(origin, shape)) for shape in shapes]
     text = _geojson(rows) if path.suffix.lower() == '.geojson' else _kml(path.stem, rows)
-    path.write_text(text, encoding='utf-8')
+    with replacing(path) as file:
+        file.write_text(text, encoding='utf-8')
 
 
 def _degrees(origin: Origin, shape: MapShape) -> list[list[float]]:

@@ -18,7 +18,7 @@ from types import FrameType
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 
 from uav_task_alloc.cli.options import OptionParser
-from uav_task_alloc.cli.outputs import check_file
+from uav_task_alloc.cli.outputs import check_file, writing
 from uav_task_alloc.errors import AllocError, InvalidValue
 from uav_task_alloc.nodes.ros.udp_ports import free_domain, free_port
 from uav_task_alloc.record import ground_truth, run_folder
@@ -197,9 +197,11 @@ def write_results(out: Path) -> list[str]:
     from uav_task_alloc import plots  # imports matplotlib
     from uav_task_alloc.cli import report  # imports numba
     summary = report.summarise(out)
-    (out / run_folder.SUMMARY).write_text(json.dumps(summary, indent=2) + '\n')
+    with writing('--out', out / run_folder.SUMMARY) as file:
+        file.write_text(json.dumps(summary, indent=2) + '\n')
     print(report.summary_table(summary))
-    plots.draw_flight(out, out / run_folder.MAP)
+    with writing('--out', out / run_folder.MAP) as file:
+        plots.draw_flight(out, file)
     print(f'Details: {out / run_folder.SUMMARY}   Map: {out / run_folder.MAP}')
     return find_faults(summary)
 

@@ -13,6 +13,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from uav_task_alloc.atomic_files import replacing
 from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.plots import draw_plan_3d, uav_colour
 from uav_task_alloc.solver.chain_q import COLD_START
@@ -172,5 +173,6 @@ def _finish(figure: Figure, out: Path, title: str, notes: Iterable[str]) -> None
         for axis in (axes.xaxis, axes.yaxis):
             if axis.get_scale() == 'log':
                 plain_log(axis)
-    figure.savefig(out.with_suffix('.svg'), metadata={'Date': None})
-    figure.savefig(out.with_suffix('.png'), dpi=120)
+    for suffix, options in (('.svg', {'metadata': {'Date': None}}), ('.png', {'dpi': 120})):
+        with replacing(out.with_suffix(suffix)) as file:
+            figure.savefig(file, **options)

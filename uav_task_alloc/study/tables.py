@@ -9,6 +9,7 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
+from uav_task_alloc.atomic_files import replacing
 from uav_task_alloc.study import experiments
 from uav_task_alloc.study.experiments import Experiments
 
@@ -27,8 +28,8 @@ def write_csv(path: Path, rows: Sequence[ResultRow]) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    with path.open('w', newline='') as file:
-        out = csv.writer(file, lineterminator='\n')
+    with replacing(path) as file, file.open('w', newline='') as stream:
+        out = csv.writer(stream, lineterminator='\n')
         out.writerow(rows[0] if rows else [])
         out.writerows([cell_text(value) for value in row.values()] for row in rows)
 

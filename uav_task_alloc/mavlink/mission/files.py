@@ -17,6 +17,7 @@ from urllib.parse import quote
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from uav_task_alloc.atomic_files import replacing
 from uav_task_alloc.geometry.fence_area import AreaCorners, zones_outside
 from uav_task_alloc.geometry.frames import Origin, to_geodetic, to_geodetic_batch
 from uav_task_alloc.geometry.zones import path_is_clear
@@ -82,9 +83,11 @@ def write_missions(scenario: Scenario, plan: Plan, folder: str | Path,
     directory.mkdir(parents=True, exist_ok=True)
     for mission in missions:
         name = file_name(mission.uav.id)
-        directory.joinpath(f'{name}.plan').write_text(
-            json.dumps(plan_file(mission), indent=2, allow_nan=False) + '\n')
-        directory.joinpath(f'{name}.waypoints').write_text(waypoints_text(mission))
+        for suffix, text in (
+                ('plan', json.dumps(plan_file(mission), indent=2, allow_nan=False) + '\n'),
+                ('waypoints', waypoints_text(mission))):
+            with replacing(directory / f'{name}.{suffix}') as file:
+                file.write_text(text)
     return missions
 
 
