@@ -42,6 +42,14 @@ def test_finding_34_a_folder_with_files_of_others_is_refused_and_left_as_it_is(
     assert thesis.read_text() == 'years of work'
 
 
+def test_an_output_folder_that_cannot_be_made_names_the_option(tmp_path, capsys, no_nodes):
+    tmp_path.joinpath('file').touch()
+    folder = tmp_path / 'file' / 'demo'
+    assert demo.main(['--out', str(folder)]) == 1
+    assert capsys.readouterr().err == (f"demo: --out = '{folder}': expected a place that can be "
+                                       'written: Not a directory\n')
+
+
 def test_a_domain_in_which_another_node_takes_part_is_not_chosen():
     domain = free_domain(50)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:

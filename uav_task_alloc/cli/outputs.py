@@ -92,6 +92,16 @@ def naming(option: str, path: Path) -> Iterator[None]:
     """Within `with`, an OSError becomes an InvalidValue that names the option.
 
     A pipe that nobody reads any more is no error of the option.
+
+    Args:
+        option: for errors: `--json`.
+        path: of the option.
+
+    Returns:
+        None.
+
+    Raises:
+        InvalidValue: the text has the OSError.
     """
     try:
         yield

@@ -18,7 +18,7 @@ from types import FrameType
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 
 from uav_task_alloc.cli.options import OptionParser
-from uav_task_alloc.cli.outputs import check_file, writing
+from uav_task_alloc.cli.outputs import check_file, naming, writing
 from uav_task_alloc.errors import AllocError, InvalidValue
 from uav_task_alloc.nodes.ros.udp_ports import free_domain, free_port
 from uav_task_alloc.record import ground_truth, run_folder
@@ -161,7 +161,8 @@ def fly_scenario(args: argparse.Namespace) -> int:
     """
     out = args.out
     load(args.scenario)  # an invalid one must not cost earlier results
-    run_folder.prepare(out)
+    with naming('--out', out):
+        run_folder.prepare(out)
     signals: list[int] = []
     # an exception while the nodes are started would leave some of them running
     with signal_handler(lambda number, _: signals.append(number)):
