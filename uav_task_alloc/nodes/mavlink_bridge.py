@@ -38,6 +38,7 @@ from uav_task_alloc.nodes.ros.clock_watch import is_simulated, ros_time, steady_
 from uav_task_alloc.nodes.ros.hold_inputs import HoldInputs
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.origin_check import OriginCheck
+from uav_task_alloc.nodes.ros.other_bridges import OtherBridges
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.nodes.ros.task_list_inputs import TaskListInputs
@@ -114,6 +115,7 @@ class MavlinkBridge(Node):
         self.origins = OriginCheck(self, self.config.origin, lambda reason: self.log.write(
             'warning', f'fleet_origin: {reason}: ignored'))
         self.lists = TaskListInputs(self, self.log, self.to_list, self.assign_lists)
+        self.others = OtherBridges(self)
         self.holds = HoldInputs(self, self.log, self.stamp, self.on_hold)
         self.create_service(HandOver, '~/hand_over', self.on_hand_over)
         steady = steady_clock()  # links and vehicles do not wait for simulated time
@@ -269,7 +271,8 @@ class MavlinkBridge(Node):
         self.origins.check()
         unheard = unheard_publishers(self, {'threat_zones': LATCHED, 'fleet_origin': LATCHED})
         rows += self.report.part_rows(self.origins.conflict(), unheard,
-                                      self.holds.late.warning(now))
+                                      self.holds.late.warning(now),
+                                      self.others.warning(sorted(self.lists.known), now))
         self.diagnostics.publish(from_diagnostics(rows, stamp))
 
     def stamp(self) -> float:

@@ -85,13 +85,14 @@ class BridgeDiagnostics:
                 for uav_id, each in rows]
 
     def part_rows(self, conflict: str, unheard: Sequence[str] = (),
-                  late_hold: str = '') -> Iterator[DiagnosticRow]:
+                  late_hold: str = '', shared_ids: str = '') -> Iterator[DiagnosticRow]:
         """A row for each link and other part.
 
         Args:
             conflict: why the origins of the nodes differ; '' where they agree.
             unheard: a sentence for each publisher that is not received.
             late_hold: what is wrong with a hold that expires too early; '' where none does.
+            shared_ids: which UAVs another node flies, too; '' for none.
         """
         refusal = conflict and f'refuses to fly new lists: {conflict}'
         self._log.report_trouble('fleet_origin', refusal)
@@ -103,6 +104,9 @@ class BridgeDiagnostics:
             yield self._row('topics', _WARN, '; '.join(unheard))
         if late_hold:
             yield self._row('holds', _WARN, late_hold)
+        self._log.report_trouble('uav_ids', shared_ids, 'warning')
+        if shared_ids:
+            yield self._row('uav_ids', _WARN, shared_ids)
         for link in self._connections.links:
             self._log.report_trouble(link.name, link.trouble)
             yield self._row(link.name, _ERROR if link.trouble else _OK, link.trouble or 'open')
