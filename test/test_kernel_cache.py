@@ -40,8 +40,20 @@ from uav_task_alloc.solver.callee import callee
 @kernel
 def caller(x):
     return callee(x)
+
+
+def half(x):
+    return 0.5 * x
 """
 CALL = 'from uav_task_alloc.solver.caller import caller; print(caller(1.0))'
+FULL_DISK = """
+import resource
+import numba
+from uav_task_alloc.kernel import c_function
+from uav_task_alloc.solver.caller import caller, half
+resource.setrlimit(resource.RLIMIT_FSIZE, (16, 16))
+print(caller(1.0), c_function(half, numba.float64(numba.float64)).ctypes(3.0))
+"""
 LOAD = 'from uav_task_alloc.solver import solve; solve.load_kernels()'
 PLAN = "from uav_task_alloc import __main__ as cli; cli.main(['plan', 'one.yaml'])"
 SCENARIO = 'uavs: [{id: u, position: [0, 0, 50]}]\ntasks: [{id: t, position: [90, 0, 50]}]\n'
@@ -84,6 +96,15 @@ def test_a_kernel_is_compiled_again_when_a_callee_in_another_file_was_edited(pac
     assert output(package) == ('6.0', True)
     (package / 'solver/callee.py').write_text(CALLEE)
     assert output(package) == ('2.0', False)  # the earlier folder is kept for a while
+
+
+def test_on_a_full_disk_kernels_are_used_though_they_cannot_be_kept(package):
+    with start(package, FULL_DISK) as process:
+        printed, errors = process.communicate(timeout=180.0)
+    assert printed == '2.0 1.5\n', errors
+    assert errors.count('compiled kernels cannot be kept on disk ([Errno 27]') == 1
+    assert not list(package.rglob('*.nbc'))
+    assert output(package) == ('2.0', True)
 
 
 @pytest.mark.parametrize(('missing', 'on_disk'), [

@@ -21,7 +21,7 @@ from numba import types
 from numba.core.registry import CPUDispatcher
 
 from uav_task_alloc.kernel_arguments import pass_tuples_whole
-from uav_task_alloc.kernel_cache import ON_DISK, install
+from uav_task_alloc.kernel_cache import NOTICE, ON_DISK, install
 from uav_task_alloc.kernel_shortcuts import shortcuts
 
 NJIT: Any = numba.njit  # its stubs do not know all options
@@ -41,7 +41,11 @@ class _Kernel(CPUDispatcher):
     def compile(self, sig: Any) -> Any:
         """Compile it for some types, or load it."""
         with shortcuts():
-            return super().compile(sig)
+            try:
+                return super().compile(sig)
+            except OSError as error:  # on a full disk it is compiled, and not kept
+                NOTICE.report_not_kept(error)
+                return super().compile(sig)
 
 
 class _InnerKernel(_Kernel):
@@ -140,10 +144,14 @@ def c_function(function: Callable[..., Any], signature: Any) -> Any:
         signature: numba's, of its types.
 
     Returns:
-        The compiled function; cached on disk.
+        The compiled function; cached on disk, where that can be written.
     """
     with shortcuts():
-        return numba.cfunc(signature, cache=True)(function)
+        try:
+            return numba.cfunc(signature, cache=True)(function)
+        except OSError as error:
+            NOTICE.report_not_kept(error)
+            return numba.cfunc(signature)(function)
 
 
 def _compiled(kind: type[_Kernel], function: _Function, **options: Any) -> _Function:

@@ -179,6 +179,7 @@ class CompilationNotice(event.Listener):
         self._clock = clock
         self._terminal: TextIO | None = None
         self._printed, self._loaded = False, set[object]()
+        self.not_kept = False  # a kernel could not be written to disk
         self._depth = 0  # passes under way in the main thread: a kernel compiles those it calls
         self._now, self._later = FIRST_WORK.plus(SEARCH_WORK).plus(ZONES_WORK), NO_WORK
         self._began, self._compiled_before = 0.0, 0  # when the line was printed
@@ -258,6 +259,17 @@ class CompilationNotice(event.Listener):
             yield
         finally:
             self._terminal = None
+
+    def report_not_kept(self, error: OSError) -> None:
+        """Print once why compiled kernels are not on disk.
+
+        Args:
+            error: of the write.
+        """
+        if not self.not_kept:
+            self.not_kept = True
+            print(f'compiled kernels cannot be kept on disk ({error}): the next start compiles '
+                  'them again; NUMBA_CACHE_DIR names another folder', file=sys.stderr, flush=True)
 
     def _print_once(self) -> None:
         self._printed, self._began, self._compiled_before = True, self._clock(), self.compiled
