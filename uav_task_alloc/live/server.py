@@ -24,7 +24,7 @@ PAGE_FILES = {'/': ('index.html', 'text/html'), '/live.css': ('live.css', 'text/
         **{f'/{name}.js': (f'{name}.js', 'text/javascript')
            for name in (
            'cards', 'chart', 'demand', 'gantt', 'geo', 'gestures', 'labels', 'layers',
-           'live', 'map', 'model', 'overlay', 'panels', 'tiles', 'times')}}
+           'live', 'map', 'model', 'near', 'overlay', 'panels', 'tiles', 'times')}}
 LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data: {}; "

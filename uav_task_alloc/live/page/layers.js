@@ -96,6 +96,17 @@ export function zoneOutline(zone, margin = 0) {
   return TURN.map(a => [zone.center[0] + r * Math.cos(a), zone.center[1] + r * Math.sin(a)]);
 }
 
+export function isInside(zone, [x, y]) {
+  if (zone.shape !== 'POLYGON') {
+    return Math.hypot(x - zone.center[0], y - zone.center[1]) <= zone.radius;
+  }
+  const rim = zone.vertices;
+  return rim.reduce((odd, [ax, ay], k) => {
+    const [bx, by] = rim[(k + 1) % rim.length];
+    return (ay > y) !== (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax) ? !odd : odd;
+  }, false);
+}
+
 export function drawZones(context, view, zones, colours) {
   context.strokeStyle = colours.zone;
   for (const zone of zones) {

@@ -4,13 +4,16 @@ import {DemandLayer} from './demand.js';
 import {degreesText, frameOf, metresText, roundStep} from './geo.js';
 import {listen} from './gestures.js';
 import {RINGS, drawArea, drawGrid, drawRings, drawRoutes, drawTasks, drawWaits, drawWorks,
-  drawZones, themeColours, zoneOutline} from './layers.js';
+  drawZones, isInside, themeColours} from './layers.js';
+import {some} from './model.js';
+import {nearOf} from './near.js';
 import {Overlay} from './overlay.js';
 import {Tiles} from './tiles.js';
 
 const SCALES = [1e-4, 50];  // [px/m]
 const PADDING = 56;     // [px] around all that is shown
 const REACH = 14;       // [px] around a click
+const FAR = 4;          // names of what is far away
 
 const within = (box, {x, y}) => box && x >= box[0] && x <= box[2] && y >= box[1] && y <= box[3];
 
@@ -21,7 +24,8 @@ export class FleetMap {
     Object.assign(this, {node, pickTask, pickUav, scene: null, fitted: null, moved: false,
       drawn: 0, origin: ''});
     Object.assign(this, {canvas: part('canvas'), tip: part('.tip'), readout: part('.readout'),
-      bar: part('.bar'), empty: part('.empty'), attribution: part('.attribution')});
+      bar: part('.bar'), empty: part('.empty'), far: part('.far'),
+      attribution: part('.attribution')});
     this.context = this.canvas.getContext('2d');
     this.overlay = new Overlay(node, this.context);
     this.view = {x: 0, y: 0, scale: .5, width: 0, height: 0, frame: null,
@@ -57,6 +61,7 @@ export class FleetMap {
 
   show(scene) {
     this.scene = scene;
+    this.near = nearOf(scene);
     const key = JSON.stringify(scene.origin);
     if (key !== this.origin) {
       this.origin = key;
@@ -83,7 +88,7 @@ export class FleetMap {
     this.schedule();
   }
 
-  // All that is shown, until the map is moved.
+  // All that is near, until the map is moved.
   fit() {
     this.moved = false;
     this.fitted = null;
@@ -98,11 +103,7 @@ export class FleetMap {
   }
 
   bounds() {
-    const {tasks, uavs, zones, area, routes, works} = this.scene;
-    const points = [...tasks.map(task => task.position), ...uavs.map(uav => uav.position),
-      ...works.flatMap(work => work.path), ...area,
-      ...zones.flatMap(zone => zoneOutline(zone)), ...routes.flatMap(route => route.points)]
-      .filter(([x, y]) => x !== null && y !== null);
+    const {points} = this.near;
     if (!points.length) return null;
     const box = [Infinity, Infinity, -Infinity, -Infinity];
     for (const [x, y] of points) {
@@ -161,6 +162,7 @@ export class FleetMap {
     drawRings(context, view, scene.picked, RINGS.picked, colours.ink);
     this.overlay.draw(view, scene, texts, colours);
     this.drawScale();
+    this.showFar();
     this.empty.hidden = scene.uavs.length + scene.tasks.length > 0;
     Object.assign(node.dataset, {drawn: ++this.drawn, picked: scene.pickedId,
       view: [view.x, view.y, view.scale].join(' ')});  // [m], [m], [px/m]
@@ -170,6 +172,17 @@ export class FleetMap {
     const length = roundStep(120 / this.view.scale);
     this.bar.style.width = `${(length * this.view.scale).toFixed(0)}px`;
     this.bar.textContent = length >= 1000 ? `${length / 1000} km` : `${length} m`;
+  }
+
+  // What is far from all else and not in sight.
+  showFar() {
+    const {view, far: node} = this, names = this.near.far.filter(({point}) => {
+      const [x, y] = view.pixel(point);
+      return x < 0 || y < 0 || x > view.width || y > view.height;
+    }).map(({name}) => name);
+    const text = `▲ Far away, outside of the map: ${some(names, FAR, '; ')}.`;
+    node.hidden = !names.length;
+    if (node.textContent !== text) node.textContent = text;
   }
 
   // pointing
@@ -218,15 +231,4 @@ export class FleetMap {
     this.tip.hidden = true;
     this.readout.textContent = '';
   }
-}
-
-function isInside(zone, [x, y]) {
-  if (zone.shape !== 'POLYGON') {
-    return Math.hypot(x - zone.center[0], y - zone.center[1]) <= zone.radius;
-  }
-  const rim = zone.vertices;
-  return rim.reduce((odd, [ax, ay], k) => {
-    const [bx, by] = rim[(k + 1) % rim.length];
-    return (ay > y) !== (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax) ? !odd : odd;
-  }, false);
 }

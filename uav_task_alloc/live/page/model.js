@@ -23,9 +23,9 @@ export const stamp = wall => span(seconds(wall));
 export const mission = wallSeconds => wallSeconds * live.clock.speedup;
 export const ofDay = (wall, zone = {}) => new Date(wall * 1000).toLocaleTimeString('en-GB', zone);
 
-export function some(names, most) {
+export function some(names, most, comma = ', ') {
   const more = names.length - most;
-  return names.slice(0, most).join(', ') + (more > 0 ? ` and ${more} more` : '');
+  return names.slice(0, most).join(comma) + (more > 0 ? ` and ${more} more` : '');
 }
 
 // All that the page shows, at the moment `past` {wall, parts} or at present. Ids come from the
