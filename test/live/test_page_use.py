@@ -46,3 +46,16 @@ def test_the_time_of_day_has_its_zone_as_reasons_are_in_utc(tab, serve):
     page = tab(timezone_id='America/St_Johns')
     open_page(page, serve(Run().add(*FIRST).snapshots).address)
     wait(page, '#clock', '0:00 (04:30:00 GMT-3:30)')
+
+
+def test_the_keyboard_reaches_a_uav_with_a_problem_first_and_keeps_the_focus(view):
+    run = Run().add(*FIRST)
+    page = view(run.snapshots)
+    page.click('#uavs [data-uav=u1] summary')
+    run.add(state(BEGIN + 1, 'u1', (300.0, 300.0)),
+            state(BEGIN + 1, 'u2', (300.0, 300.0), mode='FAULT'))
+    wait(page, '#uavs details:first-child', 'u2')
+    assert page.evaluate('document.activeElement.parentNode.dataset.uav') == 'u1'
+    assert page.locator('#uavs [data-uav=u1]').evaluate('node => node.open')
+    page.keyboard.press('Shift+Tab')
+    assert page.evaluate('document.activeElement.parentNode.dataset.uav') == 'u2'

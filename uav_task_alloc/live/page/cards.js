@@ -47,7 +47,7 @@ function update(node, uav, done, model, colours) {
   const list = model.lists.get(uav.id), [summary, body, rows] = node.children;
   const [head, figures, next, authority] = summary.children, [, words, link] = head.children;
   summary.style.borderColor = uavColour(uav.index, colours);
-  node.classList.toggle('trouble', uav.trouble);  // sorted first
+  node.classList.toggle('trouble', uav.trouble);
   put(words, uav.words);
   put(link, uav.link, 'link ' + (uav.lost || uav.health ? 'bad' : uav.silent ? 'faint' : 'good'));
   fill(figures, JSON.stringify(uav.figures), () => uav.figures.map(figureNode));
@@ -66,7 +66,8 @@ function update(node, uav, done, model, colours) {
   [...rows.children].forEach((item, k) => put(item.lastChild, when(list[k], model, 'in ')));
 }
 
-// centre(id) shows a UAV in the middle of the map.
+// Those with problems come first, also for the keyboard. centre(id) shows a UAV in the middle of
+// the map.
 export function showUavs(model, centre) {
   put($('uav-count'), model.uavs.length ? String(model.uavs.length) : '');
   if (!model.uavs.length) return;
@@ -78,9 +79,10 @@ export function showUavs(model, centre) {
     else if (state === 'COMPLETED') add(uav, 1);
   }
   const known = new Map([...$('uavs').children].map(node => [node.dataset.uav, node]));  // open ones
-  fill($('uavs'), JSON.stringify(model.uavs.map(uav => uav.id)),
-    () => model.uavs.map(uav => known.get(uav.id) || card(uav, centre)));
-  model.uavs.forEach((uav, k) =>
+  const uavs = [true, false].flatMap(trouble => model.uavs.filter(uav => uav.trouble === trouble));
+  fill($('uavs'), JSON.stringify(uavs.map(uav => uav.id)),
+    () => uavs.map(uav => known.get(uav.id) || card(uav, centre)));
+  uavs.forEach((uav, k) =>
     update($('uavs').children[k], uav, done.get(uav.id) || 0, model, colours));
 }
 
