@@ -59,3 +59,13 @@ def test_the_keyboard_reaches_a_uav_with_a_problem_first_and_keeps_the_focus(vie
     assert page.locator('#uavs [data-uav=u1]').evaluate('node => node.open')
     page.keyboard.press('Shift+Tab')
     assert page.evaluate('document.activeElement.parentNode.dataset.uav') == 'u2'
+
+
+def test_after_a_restart_of_live_view_the_names_of_its_tasks_are_offered(tab, serve):
+    page, server = tab(), serve(Run().add(*FIRST).snapshots)
+    open_page(page, server.address)
+    server.stop()
+    serve(Run().add(announced(BEGIN, ['a1', 'a2', 'a3'])).snapshots, server.port)
+    wait(page, '#counts', '0 of 3 tasks done, 0 to fly')
+    assert page.locator('#names option').evaluate_all('nodes => nodes.map(node => node.value)') == [
+        'a1', 'a2', 'a3']

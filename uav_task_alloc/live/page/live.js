@@ -111,8 +111,8 @@ function apply(update) {
   Object.assign(live.parts, update.parts);
   for (const log of ['events', 'plans']) live[log] = [...live[log], ...update[log]].slice(-KEPT);
   if (update.parts.tasks) {
-    const names = Object.keys(update.parts.tasks);
-    fill($('names'), String(names.length), () => names.slice(0, KEPT).map(
+    const names = Object.keys(update.parts.tasks).slice(0, KEPT);
+    fill($('names'), JSON.stringify(names), () => names.map(
       name => Object.assign(make('option'), {value: name})));
   }
   if (past) showHead(readModel(past), past);
