@@ -21,6 +21,10 @@ RUN := $(STOP); . install/setup.bash 2> /dev/null && export PATH="$(CURDIR)/.ros
 
 # Of config/scenarios: demo, survey, ...
 SCENARIO := demo
+SCENARIOS := $(basename $(notdir $(wildcard config/scenarios/*.yaml)))
+ifeq ($(origin SCENARIO)$(filter $(SCENARIO),$(SCENARIOS)),command line)
+$(error SCENARIO = $(SCENARIO): expected one of $(SCENARIOS))
+endif
 
 demo: build
 	@echo '== $(SCENARIO): $(shell sed -n 's/^# //p;q' config/scenarios/$(SCENARIO).yaml) Results go to out/$(SCENARIO)'
