@@ -67,5 +67,22 @@ def test_after_a_restart_of_live_view_the_names_of_its_tasks_are_offered(tab, se
     server.stop()
     serve(Run().add(announced(BEGIN, ['a1', 'a2', 'a3'])).snapshots, server.port)
     wait(page, '#counts', '0 of 3 tasks done, 0 to fly')
-    assert page.locator('#names option').evaluate_all('nodes => nodes.map(node => node.value)') == [
-        'a1', 'a2', 'a3']
+    names = page.locator('#names option').evaluate_all('nodes => nodes.map(node => node.value)')
+    assert names == ['a1', 'a2', 'a3']
+
+
+def test_every_task_that_is_left_out_can_be_seen_under_its_reason(view):
+    names = [f'x{k}' for k in range(30)]
+    states = dict.fromkeys(names, 'UNASSIGNED  too far')
+    run = Run().add(*FIRST, announced(BEGIN, names), statuses(BEGIN, **states))
+    page = view(run.snapshots)
+    wait(page, '#left summary', '18 more')
+    page.focus('#left summary')
+    page.keyboard.press('Enter')
+    wait(page, '#left', 'x29')
+    run.add(statuses(BEGIN + 1, **{**states, 'x1': 'COMPLETED u1'}))
+    wait(page, '#left summary', '17 more')
+    assert page.locator('#left button').count() == 29
+    assert page.evaluate('document.activeElement.textContent') == '17 more'
+    page.click('#left button:has-text("x29")')
+    wait(page, '#answer', 'No UAV flies x29')

@@ -4,6 +4,8 @@
 import {LEFT, answer, live, ofDay, placeText, some, span, stamp, stateOf, until} from './model.js';
 
 const MOST = 100;  // rows of one list
+const ROW = 12;    // tasks of one reason that are always shown
+const opened = new Set();  // reasons of which all tasks are shown
 const WAITS = 'waits for the next plan';
 const KINDS = {fault: 'bad', zone: 'bad', good: 'good'};
 
@@ -20,15 +22,17 @@ export function make(tag, text = '', kind = '') {
 }
 
 // Replace the children of a node only where its key differs from that of the last call. The focus
-// stays where it was, or at a button of the same text.
+// stays where it was, or at a button of the same text, or a summary of the same name.
+const nameOf = node => node.dataset.name ?? node.textContent;
+
 export function fill(node, key, nodes) {
   if (node.dataset.key === key) return;
   node.dataset.key = key;
   const active = node.contains(document.activeElement) ? document.activeElement : null;
   node.replaceChildren(...nodes());
   if (!active) return;
-  const same = node.contains(active) ? active
-    : [...node.querySelectorAll('button')].find(other => other.textContent === active.textContent);
+  const same = node.contains(active) ? active : [...node.querySelectorAll('button, summary')]
+    .find(other => nameOf(other) === nameOf(active));
   same?.focus({preventScroll: true});
 }
 
@@ -173,6 +177,22 @@ export function showPlans(model) {
 
 // lists
 
+const buttons = ids => ids.flatMap((id, k) => [k ? ', ' : '', taskButton(id)]);
+
+// The other tasks of a reason; made when it is opened, which it stays where they change.
+function moreNode(why, ids) {
+  const node = make('details'), summary = make('summary', `${ids.length} more`);
+  summary.dataset.name = `more ${why}`;
+  node.append(summary);
+  node.open = opened.has(why);
+  if (node.open) node.append(...buttons(ids));
+  node.ontoggle = () => {
+    opened[node.open ? 'add' : 'delete'](why);
+    if (node.open && node.children.length === 1) node.append(...buttons(ids));
+  };
+  return node;
+}
+
 export function showLeft(model) {
   const groups = new Map();
   for (const id of model.ids) {
@@ -185,9 +205,9 @@ export function showLeft(model) {
   fill($('left'), JSON.stringify([model.ids.length > 0, ...groups]), () => groups.size
     ? [...groups].map(([why, ids]) => {
       const item = make('li');
-      item.append(...ids.slice(0, 12).flatMap((id, k) => [k ? ', ' : '', taskButton(id)]),
-        ids.length > 12 ? ` and ${ids.length - 12} more: ` : ': ',
+      item.append(...buttons(ids.slice(0, ROW)), ids.length > ROW ? ' and more: ' : ': ',
         make('span', why, why === WAITS ? 'faint' : 'bad'));
+      if (ids.length > ROW) item.append(moreNode(why, ids.slice(ROW)));
       return item;
     }) : [make('li', model.ids.length ? 'Every task has a UAV.' : 'No task yet.', 'none')]);
 }
