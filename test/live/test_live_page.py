@@ -168,10 +168,10 @@ def test_a_silent_uav_is_marked(view, run):
     assert page.is_hidden('#alarm')
     run.add(uavs(BEGIN + 30)[0])
     wait(page, '#counts', '2 UAVs, 1 silent')
-    assert 'silent for 0:10' in text(page, '#uavs details:nth-child(2)')
+    assert 'silent for 0:10' in text(page, '#uavs [data-uav=u2]')
     assert text(page, '#alarm') == '▲ u2: silent'
     page.click('#alarm')
-    page.wait_for_selector('#uavs details:nth-child(2)[open]')
+    page.wait_for_selector('#uavs [data-uav=u2][open]')
     run.add(*uavs(BEGIN + 31))
     page.wait_for_selector('#alarm', state='hidden')
 
