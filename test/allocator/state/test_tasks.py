@@ -179,6 +179,18 @@ def test_a_cancelled_task_leaves_its_list_and_stays_cancelled(driver):
         "event COMPLETED of task 't1': it was cancelled")
 
 
+def test_a_withdrawal_or_a_refused_change_that_is_repeated_publishes_no_statuses(driver):
+    driver.cancel('t1')
+    driver.settle()
+    assert not driver.world.outbox.statuses
+    driver.cancel('t1', 't1')
+    driver.add(('t1', 5, 5), action=AnnouncementAction.UPDATE)
+    driver.add(('t2', 5, 5))  # another task with its id
+    assert not driver.world.outbox.statuses
+    driver.cancel('t9')  # is REJECTED in them
+    assert driver.world.outbox.statuses
+
+
 def test_a_completed_task_leaves_the_list_without_a_solve(driver):
     assert driver.event('STARTED', 't1', 'a') == ''
     driver.core.tick(driver.now, driver.now)

@@ -45,6 +45,7 @@ class Announcements:
     Arguments of methods:
         action: ADD or UPDATE.
         items: as announced.
+        verdicts: on announced tasks.
         task_id, task_ids: as announced.
         stamp: [s] clock of the node.
         now: [s] steady clock.
@@ -93,6 +94,11 @@ class Announcements:
         if task_id in self._works.records:
             return TaskVerdict(task_id, False, reason)
         return self._tasks.reject(task_id, reason, stamp)
+
+    def change_statuses(self, verdicts: Iterable[TaskVerdict]) -> bool:
+        """Return whether the statuses differ: a refusal of a task that is known is in none."""
+        return any(not verdict.unchanged and (
+            verdict.accepted or verdict.task_id in self._tasks.rejected) for verdict in verdicts)
 
     def _rejected(self, item: Task | Work, why: str, stamp: float) -> TaskVerdict:
         """Reject what has no place above the ground."""

@@ -121,19 +121,19 @@ class World:
     def announce(self, action: AnnouncementAction, tasks: Iterable[Task | Work], stamp: float,
                  now: float) -> list[TaskVerdict]:
         """ADD or UPDATE tasks; returns a verdict for each."""
-        verdicts = self.announced.apply(action, tasks, stamp, now)
-        self.outbox.statuses |= any(not verdict.unchanged for verdict in verdicts)
-        return verdicts
+        return self._answered(self.announced.apply(action, tasks, stamp, now))
 
     def cancel(self, task_ids: Iterable[str], stamp: float, now: float) -> list[TaskVerdict]:
         """Withdraw tasks; returns a verdict for each."""
-        self.outbox.statuses = True
-        return self.announced.cancel(task_ids, stamp, now)
+        return self._answered(self.announced.cancel(task_ids, stamp, now))
+
+    def _answered(self, verdicts: list[TaskVerdict]) -> list[TaskVerdict]:
+        self.outbox.statuses |= self.announced.change_statuses(verdicts)
+        return verdicts
 
     def refuse(self, task_id: str, reason: str, stamp: float) -> TaskVerdict:
         """Refuse an invalid task; its status is REJECTED unless an accepted task has that id."""
-        self.outbox.statuses = True
-        return self.announced.refuse(task_id, reason, stamp)
+        return self._answered([self.announced.refuse(task_id, reason, stamp)])[0]
 
     def update_uav(self, report: UavReport, now: float, stamp: float) -> str:
         """Apply the report of a UAV; returns why the UAV is refused, '' if it is not.
