@@ -18,6 +18,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes.allocator import AllocatorNode
 from uav_task_alloc.nodes.conversions import messages
+from uav_task_alloc.nodes.conversions.announcements import to_work
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 from uav_task_alloc.zone_codec import decode_zone_message
 
@@ -52,6 +53,15 @@ def test_a_value_of_a_megabyte_is_truncated_in_the_error():
     with pytest.raises(InvalidValue) as refused:
         messages.to_task(m.Task(task_id='x' * 1_000_000), ORIGIN)
     assert '(1000002 characters)' in str(refused.value)
+    assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize('field', [
+    {'kind': 77}, {'vertical': 9}, {'kind': m.Task.LINE, 'path': [Point(x=math.nan)]},
+    {'holes': [m.Ring()] * 500}], ids=lambda field: list(field)[-1])
+def test_another_bad_field_repeats_no_id_of_a_megabyte(field):
+    with pytest.raises(InvalidValue) as refused:
+        to_work(m.Task(task_id='x' * 1_000_000, value=1.0, **field), ORIGIN)
     assert len(str(refused.value)) < 400
 
 

@@ -143,6 +143,7 @@ def to_work(msg: m.Task, origin: Origin) -> Task | Work:
     Raises:
         InvalidValue: a field, which it names, is invalid.
     """
+    check_ros_name('task_id', msg.task_id)  # the other errors have it in full
     kind = to_kind(msg)
     place = f'task {msg.task_id}: '
     vertical = to_vertical(msg)
