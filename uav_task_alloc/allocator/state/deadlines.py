@@ -116,8 +116,8 @@ class Deadlines:
         Without a known UAV that may fly it nothing is refused.
         """
         able = [record.report for record in self._fleet.records.values()
-                if may_fly(task, (), record.report)]
-        if task.payload > 0.0 and able:
+                if may_fly(task, (), record.report)] if task.payload > 0.0 else []
+        if able:
             most = max(able, key=lambda report: report.payload_capacity or 0.0)
             if task.payload > (most.payload_capacity or 0.0):
                 return (f'payload {task.payload:g} kg; the largest capacity is '
@@ -126,18 +126,20 @@ class Deadlines:
             return (f'latest {clock_text(task.latest, stamp)} is '
                     f'{duration_text(stamp - task.latest)} in the past: it is '
                     f'{clock_text(stamp, stamp)}')
-        start, uav_id = self._earliest(task, (), stamp, stamp, at_best=True)
+        start, uav_id = self._earliest(task, (), stamp, stamp, at_best=True,
+                                       enough=task.latest + _LATE)
         if uav_id and start > task.latest + _LATE:
             return (f'latest {clock_text(task.latest, stamp)} cannot be kept: the earliest '
                     f'possible start is {clock_text(start, stamp)} ({uav_id})')
         return ''
 
     def _earliest(self, task: Task, failed_on: tuple[str, ...], stamp: float, begin: float,
-                  usable: bool | None = None, at_best: bool = False) -> tuple[float, str]:
+                  usable: bool | None = None, at_best: bool = False,
+                  enough: float = -math.inf) -> tuple[float, str]:
         """The earliest start of a task that is flown first and straight, and by which UAV.
 
         usable: of UAVs that may be given tasks (True), may not (False), or all; at_best: with
-        nothing lost at stops or to the wind.
+        nothing lost at stops or to the wind; enough: the first start that is not later will do.
         """
         best = math.inf, ''
         for uav_id, record in self._fleet.records.items():
@@ -152,6 +154,8 @@ class Deadlines:
             places = (task.position, task.end) if task.reversible else (task.position,)
             seconds = min(pace.seconds((record.report.position, place)) for place in places)
             best = min(best, (max(max(begin, task.release) + seconds, task.earliest), uav_id))
+            if best[0] <= enough:
+                break
         return best
 
     def _has_payload(self, task: Task, report: UavReport) -> bool:
