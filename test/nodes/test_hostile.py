@@ -14,12 +14,16 @@ from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 
+from uav_task_alloc.allocator.core import make_safe_paths
+from uav_task_alloc.allocator.records import SavedState
+from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes.allocator import AllocatorNode
 from uav_task_alloc.nodes.conversions import messages
-from uav_task_alloc.nodes.conversions.announcements import to_work
+from uav_task_alloc.nodes.conversions.announcements import announce, to_work
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
+from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.zone_codec import decode_zone_message
 
 pytestmark = pytest.mark.ros
@@ -63,6 +67,21 @@ def test_another_bad_field_repeats_no_id_of_a_megabyte(field):
     with pytest.raises(InvalidValue) as refused:
         to_work(m.Task(task_id='x' * 1_000_000, value=1.0, **field), ORIGIN)
     assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize(('action', 'count', 'why'), [
+    (m.TaskAnnouncement.ADD, 10_001, 'tasks: number = 10001: expected at most 10000'),
+    (77, 3000, 'action = 77: expected ADD (0), UPDATE (1) or CANCEL (2)')])
+def test_a_refused_message_of_many_tasks_names_some_and_how_many_more(action, count, why):
+    world = World(AllocatorParams(), SavedState(), make_safe_paths, lambda *_: None)
+    world.refuse('before', 'why', 1.0)
+    verdicts = announce(world, m.TaskAnnouncement(
+        action=action, tasks=[m.Task(task_id=f't{k}') for k in range(count)]), ORIGIN, 1.0, 1.0)
+    assert [verdict.task_id for verdict in verdicts] == [f't{k}' for k in range(20)]
+    assert {verdict.reason for verdict in verdicts} == {
+        f'{why}; refused with {count - 20} more tasks of the message'}
+    assert [*world.tasks.rejected] == ['before', *(verdict.task_id for verdict in verdicts)]
+    assert len(world.outbox.notes) == 21
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from uav_task_alloc.nodes.conversions.work_fields import (
 from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.work.values import MOST_HOLES, Kind, Vertical
 
+_MOST_REFUSED = 20  # tasks that are named where a whole message is refused
 _ANY_ORIGIN = Origin(0.0, 0.0, 0.0)  # tasks in LOCAL do not depend on it
 
 
@@ -37,15 +38,18 @@ def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float
         stamp, now: the published and the steady clock [s].
 
     Returns:
-        A verdict for each task; for the first MOST_TASKS of a message with more than that.
+        A verdict for each task. Where the whole message is refused, for its action or its number
+        of tasks, for the first 20 of them, with how many more there are.
     """
-    def refuse(task: m.Task, error: InvalidValue) -> TaskVerdict:
-        return world.refuse(cut(task.task_id), str(error), stamp)
+    def refuse(task: m.Task, why: str) -> TaskVerdict:
+        return world.refuse(cut(task.task_id), why, stamp)
 
     try:
         action = to_action(msg)
     except InvalidValue as error:
-        return [refuse(task, error) for task in msg.tasks[:MOST_TASKS]]
+        more = len(msg.tasks) - _MOST_REFUSED
+        why = str(error) + (f'; refused with {more} more tasks of the message' if more > 0 else '')
+        return [refuse(task, why) for task in msg.tasks[:_MOST_REFUSED]]
     tasks: list[Task | Work] = []
     task_ids: list[str] = []
     refused: list[TaskVerdict] = []
@@ -56,7 +60,7 @@ def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float
             else:
                 tasks.append(to_work(task, origin))
         except InvalidValue as error:
-            refused.append(refuse(task, error))
+            refused.append(refuse(task, str(error)))
     if action is AnnouncementAction.CANCEL:
         return world.cancel(task_ids, stamp, now) + refused
     return world.announce(action, tasks, stamp, now) + refused
