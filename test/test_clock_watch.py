@@ -38,6 +38,18 @@ def test_a_watch_says_whether_the_clock_stands_still():
     assert still == [False, False, False, True, False]
 
 
+@pytest.mark.parametrize(('ros', 'text'), [
+    (0.0, 'use_sim_time is true, and nothing publishes /clock: waiting for it'),
+    (10.0, '/clock has stood still at 10.0 s for 9 s: all times wait for it')])
+def test_a_clock_that_stands_still_is_a_warning_while_it_does(ros, text):
+    watch, warnings = ClockWatch(), []
+    for at, steady in ((ros, 1.0), (ros, 6.0), (ros, 10.0), (ros + 1.0, 11.0)):
+        watch.update(at, steady)
+        warnings.append(watch.warning(steady))
+    assert warnings[2] == text
+    assert [bool(warning) for warning in warnings] == [False, True, True, False]
+
+
 def test_a_pause_between_two_ticks_is_not_mentioned():
     assert lines((10.0, 0.0), (10.0, 4.5), (11.0, 4.9)) == []
 

@@ -2,7 +2,7 @@
 """Findings 23 and 24 with real nodes: journals of another origin, UAVs that are forgotten."""
 import pytest
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Header
 from test_allocator import Fleet, add, begin, task
 
@@ -42,6 +42,14 @@ def test_diagnostics_name_a_uav_of_a_machine_with_another_clock(start, probe, fl
     ahead = probe.node.get_clock().now().seconds_nanoseconds()[0] + 3600
     fleet.uav('a', 0.0, header=Header(stamp=Time(sec=ahead)))
     probe.until(lambda: any('reports of a are stamped 3' in row.message
+                            for msg in health for row in msg.status))
+
+
+def test_diagnostics_say_that_simulated_time_stands_still(start, probe, fleet):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    begin(start, fleet, '-p', 'use_sim_time:=true')
+    probe.until(lambda: any('nothing publishes /clock: waiting for it' in row.message
+                            and row.level == DiagnosticStatus.WARN
                             for msg in health for row in msg.status))
 
 

@@ -111,7 +111,7 @@ class AllocatorNode(Node):
         self._create_topics()
         self.result_ready = self.create_guard_condition(self.on_results)
         self.subscribers_by = time.monotonic() + _SUBSCRIBER_TIMEOUT
-        watch_clock(self, self.get_logger().warning)
+        self.clock_watch = watch_clock(self, self.get_logger().warning)
         self.offsets = ClockOffsets('reports')
         self.refused_zones = ''  # of the last message
         self.worker = Worker(self.load_solver, self.solve, self.deliver, self.on_solver_error)
@@ -359,7 +359,9 @@ class AllocatorNode(Node):
             self.get_logger().error(stopped if conflict else 'fleet_origin: all agree')
         warnings = health_warnings(self.world, self.persistence.error, self.solver_error,
                                    self.stamp())
-        warnings += filter(None, [self.offsets.warning(time.monotonic()), self.refused_zones])
+        now = time.monotonic()
+        warnings += filter(None, [self.clock_watch.warning(now), self.offsets.warning(now),
+                                  self.refused_zones])
         warnings += unheard_publishers(self, {
             'task_announcements': INPUT_ANNOUNCEMENTS, 'threat_zones': LATCHED,
             'task_events': INPUT_EVENTS, 'fleet_origin': LATCHED})

@@ -38,10 +38,7 @@ class ClockWatch:
             if self.still or steady - since < _PATIENCE:
                 return ''
             self.still = True
-            return ('use_sim_time is true, and nothing publishes /clock: waiting for it'
-                    if ros == 0.0 else
-                    f'/clock has stood still at {ros:.1f} s for {steady - since:.0f} s: all '
-                    'times wait for it')
+            return self.warning(steady)
         self._last, still = (ros, steady), self.still
         self.still = False
         if ros < before:
@@ -50,6 +47,17 @@ class ClockWatch:
             return f'/clock jumped forward by {ros - before:.1f} s, to {ros:.1f} s'
         runs = 'runs again' if before > 0.0 else 'has begun'
         return f'/clock {runs} after {steady - since:.0f} s' if still else ''
+
+
+    def warning(self, steady: float) -> str:
+        """Return that the clock stands still, and for how long; '' while it runs."""
+        if not self.still or self._last is None:
+            return ''
+        ros, since = self._last
+        return ('use_sim_time is true, and nothing publishes /clock: waiting for it'
+                if ros == 0.0 else
+                f'/clock has stood still at {ros:.1f} s for {steady - since:.0f} s: all '
+                'times wait for it')
 
 
 class ClockOffsets:
@@ -158,10 +166,12 @@ def watch_clock(node: Node, warn: Callable[[str], object]) -> ClockWatch:
     watch = ClockWatch()
 
     def on_timer() -> None:
-        if is_simulated(node):
-            text = watch.update(ros_time(node), time.monotonic())
-            if text:
-                warn(text)
+        if not is_simulated(node):
+            watch.still = False
+            return
+        text = watch.update(ros_time(node), time.monotonic())
+        if text:
+            warn(text)
 
     node.create_timer(_PERIOD, on_timer, clock=steady_clock())
     return watch
