@@ -87,6 +87,8 @@ def test_a_plan_waits_for_approval_over_a_kill_and_is_applied_once(fleet):
     stale = order(fleet, srv.ApprovePlan, 'approve_plan', revision=1, accept=True)
     assert not stale.success
     assert f'expected {proposed.plan.revision}' in stale.message
+    probe.until(lambda: 'ann: accept plan 1 refused: revision = 1: expected '
+                in fleet.allocator.output())
 
     def accept():  # refused until both UAVs have reported since the restart
         done = command('accept', str(proposed.plan.revision), '--operator', 'bob')

@@ -141,7 +141,13 @@ class OrderServices:
             msg.revision, msg.accept, to_operator(msg), msg.dry_run, time.monotonic(),
             self._stamp())
         self._save()
+        word = 'accept' if msg.accept else 'reject'
+        self._log_refusal(msg, f'{word} plan {msg.revision}', answer)
         return from_order_answer(answer, response)
+
+    def _log_refusal(self, msg: Any, what: str, answer: OrderAnswer) -> None:
+        if not answer.success:
+            self._node.get_logger().warning(f'{to_operator(msg)}: {what} {answer.message}')
 
     def _callback(self, action: OrderAction) -> Callable[[Any, Any], Any]:
         async def respond(msg: Any, response: Any) -> Any:
@@ -153,9 +159,7 @@ class OrderServices:
                 conflict = self._conflict() if action in _NEEDS_LISTS else ''
                 answer = (refused(f'nothing is planned: {conflict}') if conflict
                           else await self._decided(request))
-            if not answer.success:
-                self._node.get_logger().warning(
-                    f'{to_operator(msg)}: {action.value} {answer.message}')
+            self._log_refusal(msg, action.value, answer)
             return from_order_answer(answer, response)
         return respond
 
