@@ -57,6 +57,34 @@ def test_an_update_to_another_kind_or_to_a_time_that_has_passed_moves_nothing(mo
         assert run.tasks['t1'].position[0] == east
 
 
+@pytest.mark.parametrize(('action', 'state', 'more', 'texts'), [
+    ('UPDATE', 'ASSIGNED', {}, ['changed: t1']),
+    ('UPDATE', 'FAILED', {}, ['changed: t1']),
+    ('UPDATE', 'COMPLETED', {}, []),
+    ('UPDATE', 'CANCELLED', {}, []),
+    ('UPDATE', 'REJECTED', {}, []),
+    ('UPDATE', 'ASSIGNED', {'latest': 1.0}, []),
+    ('UPDATE', 'ASSIGNED', {'id': 't9'}, []),
+    ('ADD', 'ASSIGNED', {}, []),
+    ('ADD', 'REJECTED', {}, ['announced: t1']),
+    ('ADD', 'ASSIGNED', {'id': 't9'}, ['announced: t9']),
+    ('CANCEL', 'ASSIGNED', {}, ['to be withdrawn: t1']),
+    ('CANCEL', 'CANCELLED', {}, [])])
+def test_only_what_may_change_a_task_is_an_event(action, state, more, texts):
+    run = RunState()
+    announce(run, 'ADD', 100.0, 1.0)
+    status(run, state)
+    line = {'kind': 'announcement', 'wall': 3.0, 'action': action,
+            'tasks': [{'id': 't1', 'position': [900.0, 0.0, 50.0], **more}]}
+    assert [text for _, text in sentences(run, line)] == texts
+
+
+def test_a_change_before_the_first_statuses_is_an_event():
+    line = {'kind': 'announcement', 'wall': 3.0, 'action': 'UPDATE',
+            'tasks': [{'id': 't1', 'position': [900.0, 0.0, 50.0]}]}
+    assert [text for _, text in sentences(RunState(), line)] == ['changed: t1']
+
+
 def zone_message(zone_id, margin):
     return SimpleNamespace(zone_id=zone_id, shape=1, center=SimpleNamespace(x=50.0, y=0.0, z=0.0),
                            radius=20.0, vertices=[], z_min=0.0, z_max=200.0, margin=margin)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.record.record_file import Line
+from uav_task_alloc.record.reported import is_refused
 from uav_task_alloc.record.run_state import RunState
 from uav_task_alloc.zone_codec import decode_zone
 
@@ -36,10 +37,26 @@ def sentences(state: RunState, line: Line) -> Iterator[Sentence]:
     return build(state, line) if build else iter(())
 
 
-def announcement_sentences(_: RunState, line: Line) -> Iterator[Sentence]:
-    """Announced, changed and withdrawn tasks."""
-    if line['tasks'] and line['action'] in ACTION_TEXTS:
-        yield 'task', ACTION_TEXTS[line['action']].format(_ids(row['id'] for row in line['tasks']))
+def announcement_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
+    """Announced, changed and withdrawn tasks, where that may have changed anything."""
+    names = [row['id'] for row in line['tasks'] if not _changes_nothing(state, line, row)]
+    if names and line['action'] in ACTION_TEXTS:
+        yield 'task', ACTION_TEXTS[line['action']].format(_ids(names))
+
+
+def _changes_nothing(state: RunState, line: Line, row: Line) -> bool:
+    """Whether an allocator refuses what is announced of a task, or has done it before."""
+    task_id, action = row['id'], line['action']
+    known, status = state.tasks.get(task_id), state.statuses.get(task_id)
+    if action == 'CANCEL':
+        return status is not None and status.state in ('COMPLETED', 'CANCELLED')
+    if action == 'UPDATE' and status is None:  # not announced, or forgotten
+        return task_id in state.ended or (known is None and bool(state.statuses))
+    if action == 'UPDATE' and status is not None and status.state == 'REJECTED':
+        return True
+    now = line['wall'] - state.allocators.lead.seconds
+    return known is not None and status is not None and is_refused(
+        known, status, row, action, now)
 
 
 def status_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
