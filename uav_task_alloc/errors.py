@@ -54,6 +54,19 @@ def first_of(texts: Iterable[str], most: int = 5, separator: str = ', ', kind: s
     return separator.join(listed[:most]) + (f' and {more} more{kind}' if more > 0 else '')
 
 
+def counted(number: int, word: str) -> str:
+    """A number of things in words: `1 task`, `2 tasks`.
+
+    Args:
+        number: of them.
+        word: for one; its plural ends with s.
+
+    Returns:
+        The number and the word.
+    """
+    return f'{number} {word}' + 's' * (number != 1)
+
+
 def damage(error: Exception) -> str:
     """Why a document that others wrote cannot be read, for an error text.
 

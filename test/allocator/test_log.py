@@ -3,6 +3,7 @@
 from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.records import AnnouncementAction
+from uav_task_alloc.allocator.status import health_warnings
 from uav_task_alloc.model import Task
 
 
@@ -22,6 +23,16 @@ def test_a_plan_has_a_line_with_trigger_tasks_metres_finish_and_solve_time():
     assert line == ('plan 1 (a reports, ADD t1, ADD t2 and 1 more): 2 tasks on 1 UAV, 1 left out; '
                     '400 m, finish in 57 s, solved in 0 ms')
     assert driver.levels[line] == 'info'
+
+
+def test_one_task_is_no_tasks():
+    driver = fleet()
+    [warning] = health_warnings(driver.world, '')
+    assert warning.startswith('1 task unassigned, t3: ')
+    driver.add(Task('t4', (0.0, 0.0, 50.0), required_capabilities={'lidar'}))
+    driver.settle()
+    [warning] = health_warnings(driver.world, '')
+    assert warning.startswith('2 tasks unassigned, t3: ')
 
 
 def test_the_finish_counts_from_now():

@@ -109,11 +109,11 @@ def test_ctrl_c_while_the_search_is_compiled_prints_the_first_plan(tmp_path):
         assert process.stderr.readline().startswith('compiling kernels')
         assert process.stderr.readline().startswith('compiling kernels')
         assert process.stderr.readline() == (
-            'first plan, by insertion: 1 tasks, 0 unassigned, 90 m; Ctrl-C stops and keeps it\n')
+            'first plan, by insertion: 1 task, 0 unassigned, 90 m; Ctrl-C stops and keeps it\n')
         printed, err = press_ctrl_c(process)
     assert (process.returncode, err) == (
         130, 'stopped before the search: its kernels were not compiled yet\n')
-    assert '1 tasks planned' in printed
+    assert '1 task planned' in printed
     assert 'insertion' in printed
     assert json.loads(out.read_text())['routes'] == {'u': ['t']}
     assert list(tmp_path.rglob('insertion.*.nbc'))

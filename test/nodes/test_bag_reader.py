@@ -119,7 +119,7 @@ def test_a_task_in_degrees_that_was_announced_before_the_origin_has_its_place(tm
 def test_the_report_says_how_many_tasks_have_no_place(tmp_path, capsys):
     path = write(tmp_path / 'w.mcap', [('/task_announcements', WGS), *MESSAGES[4:]])
     assert report.main([str(path)]) == 0
-    assert 'Warning: 1 tasks in degrees are left out: there is no fleet_origin' in (
+    assert 'Warning: left out: 1 task in degrees, as there is no fleet_origin' in (
         capsys.readouterr().err)
 
 

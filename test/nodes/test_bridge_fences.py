@@ -28,7 +28,7 @@ def test_zones_become_fences_on_board_and_a_restarted_bridge_knows_its_own(
     show(50)
     probe.until(verified)
     for n in KINDS:
-        assert world.fact(n, 'fence') == 'VERIFIED, 1 zones in 1 points'
+        assert world.fact(n, 'fence') == 'VERIFIED, 1 zone in 1 point'
         assert 'FENCE_ENABLE 0' in world.fact(n, 'fence_parameters') or 'GF_ACTION 2' in (
             world.fact(n, 'fence_parameters'))
     probe.until(lambda: all(world.fact(n, 'rally_points').startswith('VERIFIED') for n in KINDS))

@@ -127,7 +127,7 @@ def test_a_plan_that_changes_no_list_is_no_replan():
             planned(7.0, 'ADD c', u1='abc'), planned(8.0, 'background', u1='bc'),
             status(('a', 'COMPLETED'))), 9):  # the status arrives after the list without the task
         run.apply({'wall': float(wall), 'kind': kind, **body})
-    assert '; 1 re-plans, last 7 ms (ADD c)' in headline(run, 2.0)
+    assert '; 1 re-plan, last 7 ms (ADD c)' in headline(run, 2.0)
     run.apply({'wall': 20.0, 'kind': 'allocation', **planned(6.0, 'CANCEL b', u1='c')[1]})
     assert [each.trigger for each in run.replans()] == ['ADD c', 'CANCEL b']
     assert len(run.solves) == 5

@@ -22,7 +22,7 @@ from uav_task_alloc.allocator.replanning.what_if import (
     broken_order,
     what_if_problem,
 )
-from uav_task_alloc.errors import first_of
+from uav_task_alloc.errors import counted, first_of
 from uav_task_alloc.piece_ids import split_piece
 
 
@@ -197,7 +197,8 @@ class OperatorDesk:
                             separator='; ')
         tasks = [task_id for order in change.add for task_id in order.tasks]
         if not tasks:
-            return first_of((f'{order.uav} has {len(world.list_of(order.uav).stops)} tasks'
+            return first_of((f'{order.uav} has '
+                              f'{counted(len(world.list_of(order.uav).stops), "task")}'
                              for order in change.add), separator='; ')
         records = [record for record in map(world.announced.known, tasks) if record]
         return first_of((f'{record.task.id} {record.state.name}' + (

@@ -12,7 +12,7 @@ from uav_task_alloc.allocator.state.works import Works
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 from uav_task_alloc.allocator.work_records import WorkRecord
-from uav_task_alloc.errors import first_of
+from uav_task_alloc.errors import counted, first_of
 from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.diagnostic_records import BATTERY_RESERVE, ORDER, UAV_WARNING, WAITING
 
@@ -103,13 +103,9 @@ def allocation_line(allocation: Allocation, finish: float) -> str:
     counts = [len(each.stops) for each in allocation.lists if each.stops]
     left_out = f', {len(plan.unassigned)} left out' if plan.unassigned else ''
     return (f'plan {allocation.revision} ({allocation.trigger}): '
-            f'{_counted(sum(counts), "task")} on {_counted(len(counts), "UAV")}{left_out}; '
+            f'{counted(sum(counts), "task")} on {counted(len(counts), "UAV")}{left_out}; '
             f'{plan.distance:.0f} m, finish in {finish:.0f} s, '
             f'solved in {1e3 * plan.solve_time:.0f} ms')
-
-
-def _counted(number: int, word: str) -> str:
-    return f'{number} {word}' + 's' * (number != 1)
 
 
 def health_warnings(world: World, journal_error: str, solver_error: str = '',
@@ -135,10 +131,10 @@ def health_warnings(world: World, journal_error: str, solver_error: str = '',
     warnings += [f'{uav_id} has no safe path home: {why}'
                  for uav_id, why in sorted(world.zone_checks.stranded.items())
                  if uav_id in fleet.records and not fleet.records[uav_id].silent][:_MAX_STRANDED]
-    warnings += [f'{len(left_out)} tasks unassigned, {left_out[0].task.id}: '
+    warnings += [f'{counted(len(left_out), "task")} unassigned, {left_out[0].task.id}: '
                  f'{left_out[0].reason}'] if left_out else []
     late = sorted(world.deadlines.late)
-    warnings += [f'{_counted(len(late), "task")} late, {late[0]}: '
+    warnings += [f'{counted(len(late), "task")} late, {late[0]}: '
                  f'{world.deadlines.texts[late[0]]}'] if late else []
     return warnings + (['no UAV available'] if open_tasks and not world.fleet.usable_ids() else [])
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from uav_task_alloc.cli.interrupt import end_process
 from uav_task_alloc.cli.progress import WIPE, SolveProgress, log_line
+from uav_task_alloc.errors import counted
 from uav_task_alloc.model import Plan
 
 INSERTION = 'insertion'  # Plan.solver of the first plan
@@ -80,7 +81,7 @@ def counted_kernels() -> Iterator[None]:
 
 def _summary(plan: Plan) -> str:
     planned = sum(len(tasks) for tasks in plan.routes.values())
-    return f'{planned} tasks, {len(plan.unassigned)} unassigned, {plan.distance:.0f} m'
+    return f'{counted(planned, "task")}, {len(plan.unassigned)} unassigned, {plan.distance:.0f} m'
 
 
 def _say(text: str) -> None:

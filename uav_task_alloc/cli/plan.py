@@ -29,7 +29,7 @@ from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
 from uav_task_alloc.cli.plan_terrain import CLEARANCE, check_ground, ground_of, plan_over_terrain
 from uav_task_alloc.cli.plan_times import has_times, times_text
 from uav_task_alloc.cli.progress import SolveProgress, log_line
-from uav_task_alloc.errors import InvalidValue, UnknownName, first_of
+from uav_task_alloc.errors import InvalidValue, UnknownName, counted, first_of
 from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
 from uav_task_alloc.params import AllocatorParams
@@ -234,7 +234,7 @@ def plan_text(result: Plan, kinds: dict[str, str]) -> str:
     lines += [f'conflict of {each.uavs[0]} and {each.uavs[1]} at {each.time:.0f} s: '
               f'{each.resolution or "NOT RESOLVED"}, {each.detail}' for each in result.conflicts]
     planned = sum(len(tasks) for tasks in result.routes.values())
-    lines.append(f'{planned} tasks{" and pieces" * bool(kinds)} planned, '
+    lines.append(f'{counted(planned, "task")}{" and pieces" * bool(kinds)} planned, '
                  f'{len(result.unassigned)} unassigned; '
                  f'{result.distance:.0f} m, finish {result.finish:.0f} s, '
                  f'response {result.response:.0f} s, value {result.value:g}, '
@@ -325,7 +325,7 @@ def missions_text(loaded: Scenario, result: Plan, folder: Path) -> str:
     lines = []
     for mission in write_missions(loaded, result, folder):
         stem = folder / file_name(mission.uav.id)
-        line = f'{stem}.plan, .waypoints: {len(mission.items)} items'
+        line = f'{stem}.plan, .waypoints: {counted(len(mission.items), "item")}'
         if mission.unfenced:
             line += ('; no fence around ' + ', '.join(zone.id for zone in mission.unfenced)
                      + ', which the route or its straight return leg passes over or under')

@@ -12,7 +12,7 @@ from statistics import median
 
 from plotly.offline import get_plotlyjs
 
-from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.errors import InvalidValue, counted
 from uav_task_alloc.flight_report.figures import all_figures
 from uav_task_alloc.flight_report.flight_history import FlightHistory, StateSpan, read_history
 from uav_task_alloc.flight_report.strips import covered_shares, piece_rows
@@ -73,10 +73,10 @@ def write_report(bag: Path, html: Path,
     history = read_history(reader)
     warnings = [f'{bag.name}: {reader.damage}; the report covers what is before'] * bool(
         reader.damage)
-    warnings += [f'{count} messages of {topic} could not be decoded'
+    warnings += [f'{counted(count, "message")} of {topic} could not be decoded'
                 for topic, count in reader.undecodable.items()]
-    warnings += [f'{len(reader.unplaced)} tasks in degrees are left out: there is no fleet_origin'
-                 ] * bool(reader.unplaced)
+    warnings += [f'left out: {counted(len(reader.unplaced), "task")} in degrees, as there '
+                 'is no fleet_origin'] * bool(reader.unplaced)
     if not history.tasks() and not history.tracks:
         raise InvalidValue('file', str(bag), 'messages of a fleet in it, found '
                            f'{reader.counted.total()} of {len(reader.counted)} topics'

@@ -26,7 +26,7 @@ from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.allocator.replanning.worker import Worker
 from uav_task_alloc.allocator.state.ground import read_ground
 from uav_task_alloc.allocator.status import health_values, health_warnings
-from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.errors import InvalidValue, counted
 from uav_task_alloc.geometry.fence_area import area_corners
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes.conversions import announcements
@@ -228,7 +228,9 @@ class AllocatorNode(Node):
         """Forget where tasks were announced."""
         count = self.world.announced.seen.forget()
         self.save()
-        response.success, response.message = True, f'{count} announcements are forgotten'
+        verb = 'is' if count == 1 else 'are'
+        response.success = True
+        response.message = f'{counted(count, "announcement")} {verb} forgotten'
         return response
 
     def on_availability(self, request: SetAvailability.Request,
@@ -347,7 +349,7 @@ class AllocatorNode(Node):
         for note in notes[:_MOST_LINES]:
             self.log.write(note.level, note.text)
         if len(notes) > _MOST_LINES:
-            self.get_logger().warning(f'and {len(notes) - _MOST_LINES} lines more')
+            self.get_logger().warning(f'and {counted(len(notes) - _MOST_LINES, "line")} more')
 
     def publish_diagnostics(self) -> None:
         """Publish warnings and figures, and compare the origins of the nodes."""

@@ -11,6 +11,7 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc import scenario
+from uav_task_alloc.errors import counted
 from uav_task_alloc.nodes.conversions.messages import (
     ANNOUNCEMENTS,
     LATCHED,
@@ -78,8 +79,9 @@ class ScenarioPlayer(Node):
         watch_clock(self, self.get_logger().warning)
         self.create_timer(_PERIOD, self.on_timer, clock=steady_clock())
         self.get_logger().info(
-            f'{played.name}: {len(played.uavs)} UAVs, {len(played.tasks)} tasks, '
-            f'{len(played.zones)} zones; waiting for an allocator')
+            f'{played.name}: {counted(len(played.uavs), "UAV")}, '
+            f'{counted(len(played.tasks), "task")}, {counted(len(played.zones), "zone")}; '
+            'waiting for an allocator')
         if ignored := played.keys_of_plan_only():
             self.get_logger().warning(
                 f'{played.name}: flights ignore {", ".join(ignored)}; only plan uses them')
@@ -156,7 +158,7 @@ def work_text(work: Work) -> str:
 
 def describe(moment: scenario.Moment) -> str:
     """A moment in one log line: `70.0 s: 3 zones; new: a03; cancelled: t05; dies: uav_3`."""
-    parts = [] if moment.zones is None else [f'{len(moment.zones)} zones']
+    parts = [] if moment.zones is None else [counted(len(moment.zones), 'zone')]
     for word, names in (('new', [work_text(work) for work in moment.works]),
                         ('cancelled', [task.id for task in moment.cancels]),
                         ('dies', list(moment.deaths)),

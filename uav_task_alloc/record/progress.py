@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from uav_task_alloc.errors import counted
 from uav_task_alloc.record.record_file import Line
 from uav_task_alloc.record.reported import FINAL_STATES
 from uav_task_alloc.record.run_state import RunState
@@ -27,11 +28,11 @@ def headline(run: RunState, clock: float) -> str:
         if run.count(state))
     zones = len(run.zones_now())
     text = (f'{clock:5.0f} s  {run.count("COMPLETED")} of {len(run.tasks)} tasks completed'
-            f'{counts}; {zones} zone{"s" * (zones != 1)}')
+            f'{counts}; {counted(zones, "zone")}')
     if run.solves:
         replans = run.replans()
         last = (replans or run.solves[:1])[-1]  # a plan that changed nothing is no re-plan
-        text += (f'; {len(replans)} re-plans, last {last.milliseconds:.0f} ms'
+        text += (f'; {counted(len(replans), "re-plan")}, last {last.milliseconds:.0f} ms'
                  + f' ({last.trigger})' * bool(last.trigger))
     return text
 

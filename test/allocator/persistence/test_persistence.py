@@ -145,7 +145,7 @@ def test_a_disk_that_comes_late_with_another_world_is_left_alone(disk, unopenabl
     (tmp_path / 'mount').mkdir()
     shutil.copy(disk.folder / FILE_NAME, tmp_path / 'mount' / FILE_NAME)
     late.add('more')
-    assert 'has 1 tasks that were not read at the start, theirs say; nothing is kept' in (
+    assert 'has 1 task not read at the start, theirs say; nothing is kept' in (
         late.persistence.error)
     assert late.again() == {'theirs'}
 

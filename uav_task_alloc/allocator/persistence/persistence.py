@@ -18,6 +18,7 @@ from uav_task_alloc.errors import (
     JournalForeign,
     JournalInUse,
     OriginMismatch,
+    counted,
 )
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import WAIT, Journal, JournalRow, read_copy, recover_rows, set_aside
@@ -134,7 +135,7 @@ class Persistence:
             rows = []
         self._recovered = rows
         self._set_lost(f'{error}; set aside as {aside.name}, a new one is kept with the '
-                       f'{len(rows)} rows that can be read')
+                       f'{counted(len(rows), "row")} that can be read')
         self._journal = Journal(self._dir)
         self._journal.put(row for row in rows if not isinstance(row.body, bytes))
         return rows
@@ -193,8 +194,9 @@ class Persistence:
         unknown = [row.id for row in held
                    if row.kind == 'task' and not allocator.knows_task(row.id)]
         if unknown:
-            raise JournalForeign(f'the journal in {self._dir} has {len(unknown)} tasks that were '
-                                 f'not read at the start, {unknown[0]} say')
+            raise JournalForeign(f'the journal in {self._dir} has '
+                                 f'{counted(len(unknown), "task")} not read at the start, '
+                                 f'{unknown[0]} say')
 
     def close(self) -> None:
         """Close the file."""

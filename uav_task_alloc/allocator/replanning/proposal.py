@@ -16,7 +16,7 @@ from uav_task_alloc.allocator.replanning.planning import BuiltLists, build_lists
 from uav_task_alloc.allocator.state.published_lists import shifted_list
 from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.world import World
-from uav_task_alloc.errors import first_of
+from uav_task_alloc.errors import counted, first_of
 from uav_task_alloc.model import Plan, Task
 
 _MOST_NAMED = 20  # tasks of one UAV in a sentence
@@ -229,8 +229,8 @@ def _change(new: UavList, before: tuple[str, ...], owner: Mapping[str, str],
     kept = ([t for t in before if t in after], [t for t in after if t in before])
     parts += ['flies its tasks in another order'] if kept[0] != kept[1] else []
     parts = parts or ['returns home' if new.returns else 'holds']
-    return (f'{new.uav} {", ".join(parts)}: {len(before)} -> {len(after)} tasks, '
-            f'{metres:+.0f} m')
+    return (f'{new.uav} {", ".join(parts)}: {len(before)} -> '
+            f'{counted(len(after), "task")}, {metres:+.0f} m')
 
 
 def _metres(world: World, each: UavList) -> float:

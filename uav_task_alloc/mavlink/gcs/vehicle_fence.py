@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.errors import first_of
+from uav_task_alloc.errors import counted, first_of
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.geometry.zones_on_path import zones_across_path
 from uav_task_alloc.mavlink.autopilots import Profile
@@ -244,10 +244,11 @@ class VehicleFence:
             return 'OFF'
         text = state.name
         if state is FenceState.VERIFIED:
-            text += f', {len(self.fence.shapes)} zones in {self.fence.points} points'
+            text += (f', {counted(len(self.fence.shapes), "zone")} in '
+                     f'{counted(self.fence.points, "point")}')
         if state is FenceState.FOREIGN:
-            text += (f', {len(transfer.held or ())} points of another station: they are left '
-                     'alone; remove them there to have the zones on board')
+            text += (f', {counted(len(transfer.held or ()), "point")} of another station, left '
+                     'alone: remove them there to have the zones on board')
         if transfer.reason:
             text += f' ({transfer.reason})'
         return text

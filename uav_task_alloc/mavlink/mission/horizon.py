@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from uav_task_alloc.errors import counted
+
 SPACE_TEXT = re.compile(r'Only (\d+) items are supported')
 
 
@@ -46,8 +48,8 @@ class Horizon:
             self.stops = None
             return 'no space on board for any task yet: retrying'
         self.stops, self.fits = stops // 2, False
-        return (f'no space on board: flying the first {self.stops} tasks of {stops}, '
-                'the others follow')
+        return (f'no space on board: flying the first {counted(self.stops, "task")} of '
+                f'{stops}, the others follow')
 
     def cut(self, stops: int, items: int, most: int) -> str:
         """Fly the tasks that a mission can hold.
@@ -62,7 +64,7 @@ class Horizon:
         """
         self.stops, self.fits = stops, False
         return (f'the list takes {items} mission items: expected at most {most}: flying the first '
-                f'{stops} tasks, the others follow')
+                f'{counted(stops, "task")}, the others follow')
 
     def grow(self) -> bool:
         """Double the horizon where the present one is on board; False where that is not known."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 
+from uav_task_alloc.errors import counted
 from uav_task_alloc.mavlink.gcs.ground_station import GroundStation
 from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
 from uav_task_alloc.mavlink.transport.connections import Connections
@@ -128,7 +129,7 @@ class BridgeDiagnostics:
         count, before = sum(refusals.count for refusals in self._refusals), self._refused
         self._refused = count
         return self._row(
-            'messages', _WARN if count > before else _OK, f'{count} messages refused', {
+            'messages', _WARN if count > before else _OK, f'{counted(count, "message")} refused', {
                 'messages_refused': count, 'frames_refused': self._connections.errors(),
                 'last_refused': '; '.join(printable(refusals.last) for refusals in self._refusals
                                           if refusals.last)})

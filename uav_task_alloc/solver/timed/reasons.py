@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from uav_task_alloc.errors import counted
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.reasons import lasting_reason, way_reason
@@ -147,7 +148,7 @@ def _needs_reason(problem: TimedProblem, routes: TimedRoutes, i: int) -> str:
                 f'{needs[first, _ARRIVAL]:.0f} s ({base.uavs[first].id})')
     able.sort(key=lambda u: float(needs[u, _LENGTH]))
     texts = [_lack(problem, i, u, needs[u]) for u in able[:_NAMED]]
-    more = f'; nor {len(able) - _NAMED} others' if len(able) > _NAMED else ''
+    more = f'; nor {counted(len(able) - _NAMED, "other")}' if len(able) > _NAMED else ''
     return 'no UAV can serve it: ' + '; '.join(texts) + more
 
 
