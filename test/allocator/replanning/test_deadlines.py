@@ -75,17 +75,6 @@ def test_a_deadline_orders_a_route_whose_shortest_order_would_miss_it():
     assert made.route('a')[-1] == 'back'  # 1400 m with it first
 
 
-def test_a_task_of_any_time_is_not_compared_with_all_uavs_of_a_large_fleet(monkeypatch):
-    driver, asked = AllocatorDriver(), []
-    for k in range(50):
-        driver.uav(f'u{k}', 10.0 * k, 0.0, 50.0)
-    pace = driver.world.flights.pace
-    monkeypatch.setattr(driver.world.flights, 'pace',
-                        lambda uav_id: asked.append(uav_id) or pace(uav_id))
-    assert driver.add(('t1', 100, 0), Task('t2', (100.0, 0.0, 50.0), latest=driver.now + 900.0))
-    assert len(asked) <= 2
-
-
 @pytest.mark.parametrize(('epoch', 'text'), [
     (1000.0, 'latest 1050.0 s cannot be kept: the earliest possible start is 1100.0 s (a)'),
     (1_800_000_000.0, 'latest 08:00:50 UTC cannot be kept: the earliest possible start is '

@@ -151,6 +151,17 @@ def test_a_refused_id_is_good_again_when_it_is_announced_well(driver):
     assert 't9' not in driver.world.tasks.rejected
 
 
+def test_a_task_of_any_time_is_not_compared_with_all_uavs_of_a_large_fleet(monkeypatch):
+    driver, asked = AllocatorDriver(), []
+    for k in range(50):
+        driver.uav(f'u{k}', 10.0 * k, 0.0, 50.0)
+    pace = driver.world.flights.pace
+    monkeypatch.setattr(driver.world.flights, 'pace',
+                        lambda uav_id: asked.append(uav_id) or pace(uav_id))
+    assert driver.add(('t1', 100, 0), Task('t2', (100.0, 0.0, 50.0), latest=driver.now + 900.0))
+    assert len(asked) <= 2
+
+
 def test_refusals_are_bounded():
     driver = AllocatorDriver()
     for k in range(1200):
