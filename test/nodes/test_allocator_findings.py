@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Findings 23 and 24 with real nodes: journals of another origin, UAVs that are forgotten."""
+import signal
+import time
+
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -51,6 +54,21 @@ def test_diagnostics_say_that_simulated_time_stands_still(start, probe, fleet):
     probe.until(lambda: any('nothing publishes /clock: waiting for it' in row.message
                             and row.level == DiagnosticStatus.WARN
                             for msg in health for row in msg.status))
+
+
+def test_a_uav_is_not_silent_where_the_allocator_itself_was_stopped(start, probe, fleet):
+    node = begin(start, fleet, '-p', 'uav_timeout:=1.0')
+    fleet.uav('a', 0.0)
+    fleet.tasks.publish(add(task('t1', 100)))
+    probe.until(lambda: fleet.route('a') == ['t1'])
+    for n in range(2, 6):
+        node.popen.send_signal(signal.SIGSTOP)
+        again = time.monotonic() + 2.0
+        probe.until(lambda again=again: time.monotonic() > again)  # the UAV reports on
+        node.popen.send_signal(signal.SIGCONT)
+        fleet.tasks.publish(add(task(f't{n}', 100 * n)))
+        probe.until(lambda name=f't{n}': name in fleet.route('a'))
+    assert 'silent' not in node.output()
 
 
 def test_finding_24_the_publishers_of_a_forgotten_uav_are_destroyed(probe):
