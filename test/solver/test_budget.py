@@ -104,6 +104,23 @@ def test_finding_20_a_stop_removes_no_task_from_the_earlier_plan():
     assert after.unassigned.keys() == result.unassigned.keys()
 
 
+@pytest.mark.parametrize('objective', ['distance', 'finish'])
+@pytest.mark.parametrize('route_end', ['hold', 'home'])
+def test_a_plan_keeps_its_tasks_where_the_budget_is_used_up_before_the_search(
+        objective, route_end):
+    """A large problem takes longer than the budget to build: then nothing was found."""
+    uavs = [Uav('u0', (0.0, 0.0, 50.0)), Uav('u1', (0.0, 900.0, 50.0))]
+    tasks = [Task(f't{k}', (200.0 * k, 250.0 * (k % 4), 50.0)) for k in range(12)]
+    options = {'objective': objective, 'route_end': route_end}
+    before = plan(uavs, tasks, budget=1e3, max_iterations=50, **options)
+    assert not before.unassigned
+    late = itertools.chain([0.0], itertools.repeat(10.0))
+    zone = ThreatZone.cylinder('zone', (-500.0, -500.0), 50.0)
+    after = plan(uavs, tasks, [zone], budget=0.1, warm=before, max_iterations=0,
+                 clock=lambda: next(late), **options)
+    assert after.unassigned == {}
+
+
 def test_finding_20_an_exception_of_stop_is_raised_by_plan():
     def stop():
         raise KeyboardInterrupt

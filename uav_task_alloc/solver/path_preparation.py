@@ -6,6 +6,7 @@ small work limit at first, so that one hard search does not prevent many easy on
 """
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import pairwise
 
@@ -17,6 +18,7 @@ from uav_task_alloc.model import Leg
 from uav_task_alloc.solver.routes import Arrays, Ints
 
 FLOWN_SHARE, NEAR_SHARE = 0.25, 0.5  # shares of the budget at which these searches end
+_LEAST_SHARE = 0.2  # of the budget that a search has however late it begins
 _MIN_BUDGET = 0.02  # [s] shorter budgets are taken as this: else no path is found at all
 WORK_LIMITS = (0, 100_000, 1_000_000, 10_000_000, UNLIMITED)  # of one search, in units of work
 _FLOWN_LIMIT = 20_000_000  # of a search for a leg that is flown already
@@ -40,38 +42,44 @@ class PathPreparation:
         self.path_budget, self.flown = SearchBudget(self._over), flown or {}
         self._clock, self._began, self._budget = clock, began, max(budget, _MIN_BUDGET)
         self._stop: Callable[[], bool] | None = stop
-        self._share, self._heeds_stop = 1.0, True
+        self._limit, self._heeds_stop = self._budget, True  # [s] since the solve began
         self.reversed: Collection[str] = ()  # of `flown`: from their last points
 
     def _over(self) -> bool:
         if self._heeds_stop and self._stop is not None and self._stop():
             return True
-        return self._clock() - self._began >= self._share * self._budget
+        return self._clock() - self._began >= self._limit
 
     def begin(self, share: float, most: int, heeds_stop: bool = True) -> None:
         """Allow each search `most` units of work until this share of the budget is used.
 
         The search for legs that are flown ignores `stop`: without them tasks of the earlier plan
-        would be dropped.
+        would be dropped. So they would where the budget was used up before, as of a large problem
+        or on a busy computer: each search has a fifth of it in any case.
 
         Args:
             share: of the budget, in [0, 1].
             most: units of work; 0: no limit.
             heeds_stop: whether `stop` ends the searches.
         """
-        self._share, self._heeds_stop = share, heeds_stop
+        elapsed = self._clock() - self._began
+        self._limit = self._budget * max(share, elapsed / self._budget + _LEAST_SHARE)
+        self._heeds_stop = heeds_stop
         self.path_budget.start_stage(most)
 
-    def find_flown(self, distances: Distances, place: Mapping[str, tuple[int, int]]) -> None:
-        """Search for the legs that are flown already.
+    def find_flown(self, distances: Distances, place: Mapping[str, tuple[int, int]],
+                   home: Mapping[str, int]) -> None:
+        """Search for the legs that are flown already, and for those home from their ends.
+
+        Straight ones are found however late it is.
 
         Args:
             distances: of the problem; a leg not found keeps its known path, where that is clear.
             place: indices in `distances` where UAV starts and tasks are entered and left, by id;
                 those of tasks flown from their first points.
+            home: index in `distances` of the home of each UAV that returns, by id.
         """
-        self.begin(FLOWN_SHARE, _FLOWN_LIMIT, heeds_stop=False)
-        rows = []
+        rows, ways_home = [], []
         for uav_id, (tasks, legs) in self.flown.items():
             stops = [place.get(name, (-1, -1))[::-1 if name in self.reversed else 1]
                      for name in (uav_id, *tasks)]
@@ -80,10 +88,16 @@ class PathPreparation:
             rows += [(i, j, points)
                      for ((_, i), (j, _)), points in zip(pairwise(stops), via, strict=True)
                      if i >= 0 and j >= 0]
+            if uav_id in home:
+                ways_home += [(i, home[uav_id]) for _, i in stops[1:] if i >= 0]
         if not rows or not distances.zones:
             return
-        distances.ensure([row[0] for row in rows], [row[1] for row in rows])
-        for i, j, points in rows if self.path_budget.interrupted else ():
+        pairs = np.array([*(row[:2] for row in rows), *ways_home]).T
+        for share, most in ((math.inf, 0), (FLOWN_SHARE, _FLOWN_LIMIT)):
+            self.begin(share, most, heeds_stop=False)
+            distances.ensure(*pairs)
+        late = self.path_budget.interrupted or self.path_budget.is_exhausted
+        for i, j, points in rows if late else ():
             if distances.given_up(i, j):
                 distances.offer_path(i, j, points)
 

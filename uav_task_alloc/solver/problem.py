@@ -134,7 +134,8 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
                       {task.id: i for i, task in enumerate(unlocked)},
                       _ends(uavs, unlocked, locked), crossed)
     if search is not None and limits.zones:
-        search.find_flown(distances, _places_by_id(problem))
+        search.find_flown(distances, _places_by_id(problem), {
+            uav.id: problem.arrays.ends + u for u, uav in enumerate(uavs) if rules.returns})
     reached = _reachable(problem) if limits.zones else locked
     if reached != locked:
         unlocked = _not_locked(tasks, reached)
