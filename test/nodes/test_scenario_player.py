@@ -9,6 +9,7 @@ from uav_task_alloc_msgs.srv import SetAvailability
 from uav_task_alloc import scenario
 from uav_task_alloc.model import Shape
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, from_stamp, to_stamp
+from uav_task_alloc.nodes.scenario_player import describe
 
 TEXT = """uavs:
   - {id: uav_1, position: [0, 0, 0], dies_at: 4}
@@ -28,6 +29,15 @@ def file(tmp_path):
     path = tmp_path / 'play.yaml'
     path.write_text(TEXT)
     return path
+
+
+def test_a_moment_of_many_tasks_names_the_first_20():
+    tasks = ''.join(f'  - {{id: t{n}, position: [{n}, 0, 30]}}\n' for n in range(1000))
+    uavs = 'uavs:\n  - {id: uav_1, position: [0, 0, 0]}\n'
+    moment = scenario.timeline(scenario.parse(uavs + 'tasks:\n' + tasks))[0]
+    line = describe(moment)
+    assert line.startswith('0.0 s: ')
+    assert line.endswith('t18, t19 and 980 more')
 
 
 def test_everything_is_announced_in_order_at_its_time(start, probe, file):

@@ -11,7 +11,7 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc import scenario
-from uav_task_alloc.errors import counted
+from uav_task_alloc.errors import counted, first_of
 from uav_task_alloc.nodes.conversions.messages import (
     ANNOUNCEMENTS,
     LATCHED,
@@ -36,6 +36,7 @@ from uav_task_alloc.work.values import Kind
 _PERIOD = 0.02  # [s]
 # the second is the name of a node that is not fully discovered yet
 _OBSERVERS = ('live_view', '_NODE_NAME_UNKNOWN_')
+_MOST_NAMED = 20  # of each kind in one line of the log
 
 
 class ScenarioPlayer(Node):
@@ -163,7 +164,7 @@ def describe(moment: scenario.Moment) -> str:
                         ('cancelled', [task.id for task in moment.cancels]),
                         ('dies', list(moment.deaths)),
                         ('orders', [order.text for order in moment.orders])):
-        parts += [f'{word}: {", ".join(names)}'] if names else []
+        parts += [f'{word}: {first_of(names, _MOST_NAMED)}'] if names else []
     return f'{moment.at:.1f} s: ' + '; '.join(parts)
 
 
