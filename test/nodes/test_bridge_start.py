@@ -3,7 +3,7 @@
 import signal
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 pytestmark = pytest.mark.ros
 
@@ -72,6 +72,16 @@ def test_a_link_that_cannot_be_opened_is_logged_once_and_in_diagnostics(start, p
     probe.until(lambda: len(health) > 2)
     assert health[-1].status[0].message == 'No such file or directory'
     assert bridge.output().count(words) == 1
+
+
+def test_diagnostics_of_a_bridge_say_that_simulated_time_stands_still(start, probe):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    start('mavlink_bridge', '-p', 'use_sim_time:=true', '-p',
+          "connections:=['udpin:127.0.0.1:0']")
+    probe.until(lambda: any('nothing publishes /clock: waiting for it' in row.message
+                            and row.level == DiagnosticStatus.WARN
+                            and row.hardware_id == 'clock'
+                            for msg in health for row in msg.status))
 
 
 def test_a_bridge_logs_what_it_listens_to_and_that_it_finds_no_vehicle(start, probe):

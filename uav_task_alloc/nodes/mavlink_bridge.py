@@ -121,7 +121,7 @@ class MavlinkBridge(Node):
         steady = steady_clock()  # links and vehicles do not wait for simulated time
         self.create_timer(0.05, self.on_timer, clock=steady)
         self.create_timer(1.0, self.publish_diagnostics, clock=steady)
-        watch_clock(self, self.log.levels['warning'])
+        self.clock_watch = watch_clock(self, self.log.levels['warning'])
 
     # the receiver thread
 
@@ -272,7 +272,8 @@ class MavlinkBridge(Node):
         unheard = unheard_publishers(self, {'threat_zones': LATCHED, 'fleet_origin': LATCHED})
         rows += self.report.part_rows(self.origins.conflict(), unheard,
                                       self.holds.late.warning(now),
-                                      self.others.warning(sorted(self.lists.known), now))
+                                      self.others.warning(sorted(self.lists.known), now),
+                                      self.clock_watch.warning(now))
         self.diagnostics.publish(from_diagnostics(rows, stamp))
 
     def stamp(self) -> float:

@@ -86,7 +86,8 @@ class BridgeDiagnostics:
                 for uav_id, each in rows]
 
     def part_rows(self, conflict: str, unheard: Sequence[str] = (),
-                  late_hold: str = '', shared_ids: str = '') -> Iterator[DiagnosticRow]:
+                  late_hold: str = '', shared_ids: str = '',
+                  still_clock: str = '') -> Iterator[DiagnosticRow]:
         """A row for each link and other part.
 
         Args:
@@ -94,6 +95,7 @@ class BridgeDiagnostics:
             unheard: a sentence for each publisher that is not received.
             late_hold: what is wrong with a hold that expires too early; '' where none does.
             shared_ids: which UAVs another node flies, too; '' for none.
+            still_clock: that simulated time stands still, which was logged; '' while it runs.
         """
         refusal = conflict and f'refuses to fly new lists: {conflict}'
         self._log.report_trouble('fleet_origin', refusal)
@@ -105,6 +107,8 @@ class BridgeDiagnostics:
             yield self._row('topics', _WARN, '; '.join(unheard))
         if late_hold:
             yield self._row('holds', _WARN, late_hold)
+        if still_clock:
+            yield self._row('clock', _WARN, still_clock)
         self._log.report_trouble('uav_ids', shared_ids, 'warning')
         if shared_ids:
             yield self._row('uav_ids', _WARN, shared_ids)
