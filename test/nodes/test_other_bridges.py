@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two bridges whose UAVs have the same ids are warned of; other nodes and fleets are not."""
 import pytest
+import rclpy
 from conftest import Probe
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from test_bridge_findings import HEARTBEAT, Bridge as WholeBridge, fact
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.nodes.conversions.messages import LATCHED, STATES
@@ -31,6 +34,28 @@ def bridge(domain):
     yield make
     for each in made:
         each.close()
+
+
+@pytest.fixture
+def whole(domain):
+    """A bridge in this process."""
+    rclpy.init(args=['--ros-args', '-p', "connections:=['udpin:127.0.0.1:0']"])
+    whole = WholeBridge()
+    yield whole
+    whole.close()
+    rclpy.try_shutdown()
+
+
+def test_the_diagnostics_of_a_bridge_name_the_uavs_that_another_one_flies(
+        whole, bridge, probe):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    whole.node.others.patience = 0.0
+    whole.send(HEARTBEAT)
+    bridge('/', 'uav_1')
+    whole.until(lambda: whole.log['warning'])
+    assert whole.log['warning'][0].startswith('uav_ids: uav_1: another node reports and flies')
+    whole.until(lambda: not probe.executor.spin_once(timeout_sec=0.0)
+              and (fact(health, 'uav_ids') or [0])[0] == ord(DiagnosticStatus.WARN))
 
 
 def test_another_bridge_with_the_same_uav_is_warned_of_once_it_stays(bridge):

@@ -27,7 +27,7 @@ class OtherBridges:
     """
 
     def __init__(self, node: Node, patience: float = _PATIENCE) -> None:
-        self._node, self._patience = node, patience
+        self._node, self.patience = node, patience
         self._searched = -math.inf  # [s] steady time
         self._since: dict[str, float] = {}  # [s] steady time, by UAV
 
@@ -45,7 +45,7 @@ class OtherBridges:
             self._searched = now
             self._since = {uav_id: self._since.get(uav_id, now)
                            for uav_id in self._shared(uav_ids)}
-        shared = [uav_id for uav_id, since in self._since.items() if now - since >= self._patience]
+        shared = [uav_id for uav_id, since in self._since.items() if now - since >= self.patience]
         return (f'{first_of(shared)}: another node reports and flies UAVs of these ids, too, so '
                 'that two vehicles may fly one list: expected a namespace or ROS_DOMAIN_ID for '
                 'each fleet, or another uav_id_pattern') if shared else ''
