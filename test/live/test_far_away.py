@@ -53,10 +53,22 @@ def test_tasks_and_zones_that_are_far_away_are_named_until_they_are_cancelled(vi
 @pytest.mark.parametrize('tasks', [['t1', 't2'], []])
 def test_a_uav_on_its_way_to_tasks_far_from_it_is_not_far_away(view, tasks):
     run = Run().add(announced(BEGIN, ['t1', 't2']), state(BEGIN, 'u1', (-30_000.0, 400.0)),
+                    state(BEGIN, 'u2', (0.0, 0.0)), state(BEGIN, 'u3', (10.0, 0.0)),
                     listed(BEGIN, 'u1', 1, tasks), statuses(BEGIN, t1='PENDING', t2='PENDING'))
     page = view(run.snapshots)
     assert page.locator('#map-box .far').is_visible() == (not tasks)
     assert (width(page) > 30_000.0) == bool(tasks)
+
+
+@pytest.mark.parametrize(('fleet', 'tasks'), [(1, 1), (3, 1), (1, 5), (3, 5)])
+@pytest.mark.parametrize('away', [15_000.0, 150_000.0])
+def test_a_base_away_from_all_tasks_is_shown_with_them(view, fleet, tasks, away):
+    names = [f't{k + 1}' for k in range(tasks)]
+    page = view(Run().add(announced(BEGIN, names), statuses(BEGIN, **dict.fromkeys(
+        names, 'PENDING')), *(state(BEGIN, f'u{k}', (-away, 10.0 * k)) for k in range(fleet)))
+        .snapshots)
+    assert page.locator('#map-box .far').is_visible() == (away > 100_000.0)
+    assert (width(page) > away) == (away < 100_000.0)
 
 
 def test_a_fleet_that_is_spread_evenly_over_far_places_is_shown_whole(view):

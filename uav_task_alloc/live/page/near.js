@@ -4,7 +4,7 @@ import {isInside, zoneOutline} from './layers.js';
 
 const FACTOR = 10;      // further away than this many times the reach of the others is far
 const LEAST = 1000;     // [m] of reach
-const FLYING = 100e3;   // [m] that a UAV with tasks to fly may be away from them
+const FLYING = 100e3;   // [m] that a UAV with tasks to fly, or most of the fleet, may be away
 const WINDS = ['east', 'north-east', 'north', 'north-west', 'west', 'south-west', 'south',
   'south-east'];
 
@@ -29,6 +29,17 @@ function reachOf(points, middle) {
   return reach;
 }
 
+// {middle, limit} [m] of all, and of the UAVs and the tasks: a base may be away from the tasks.
+function centresOf(uavs, tasks) {
+  const groups = [[...uavs, ...tasks], uavs, tasks].filter(group => group.length);
+  const [all, ...parts] = groups.map(group => {
+    const middle = middleOf(group);
+    return {middle, limit: FACTOR * reachOf(group, middle)};
+  });
+  return parts.length === 2 && distance(parts[0].middle, parts[1].middle) <= FLYING
+    ? [all, ...parts] : [all];
+}
+
 function whereFrom(middle, point) {
   const away = distance(middle, point) / 1000, wind = Math.atan2(point[1] - middle[1],
     point[0] - middle[0]) * 4 / Math.PI;
@@ -38,23 +49,26 @@ function whereFrom(middle, point) {
 // {points, far} of a scene: the points to fit, and {name, point} of each thing of which none is
 // near. O(n log n).
 export function nearOf({tasks, uavs, zones, area, routes, works}) {
-  const shown = tasks.filter(task => task.kind !== 'cancelled');
-  const things = [
-    ...uavs.map(uav => ({name: uav.id, points: [uav.position], index: uav.index})),
-    ...shown.map(task => ({name: `task ${task.id}`, points: [task.position]}))]
-    .filter(thing => known(thing.points[0]));
-  const anchors = things.map(thing => thing.points[0]);
+  const placed = things => things.filter(thing => known(thing.points[0]));
+  const fleet = placed(uavs.map(
+    uav => ({name: uav.id, points: [uav.position], index: uav.index})));
+  const shown = placed(tasks.filter(task => task.kind !== 'cancelled').map(
+    task => ({name: `task ${task.id}`, points: [task.position]})));
   const shapes = [...zones.map(zone => ({name: `zone ${zone.id}`, zone,
     points: zoneOutline(zone)})), {points: area}];
   const lines = [...routes.map(route => ({points: route.points})),
     ...works.map(work => ({points: work.path}))];
-  if (!anchors.length) return {points: shapes.flatMap(shape => shape.points), far: []};
-  const middle = middleOf(anchors), limit = FACTOR * reachOf(anchors, middle);
+  if (!fleet.length && !shown.length) {
+    return {points: shapes.flatMap(shape => shape.points), far: []};
+  }
+  const anchors = things => things.map(thing => thing.points[0]);
+  const centres = centresOf(anchors(fleet), anchors(shown)), {middle} = centres[0];
   const flying = new Set(routes.map(route => route.index));
   const points = [], far = [];
-  for (const {name, zone, index, points: all} of [...things, ...shapes, ...lines]) {
-    const most = flying.has(index) ? Math.max(limit, FLYING) : limit;
-    const near = all.filter(point => known(point) && distance(point, middle) <= most);
+  for (const {name, zone, index, points: all} of [...fleet, ...shown, ...shapes, ...lines]) {
+    const least = flying.has(index) ? FLYING : 0;
+    const near = all.filter(point => known(point) && centres.some(
+      centre => distance(point, centre.middle) <= Math.max(centre.limit, least)));
     points.push(...near);
     if (!name || near.length || zone && isInside(zone, middle)) continue;
     const at = all.reduce((a, b) => (distance(b, middle) < distance(a, middle) ? b : a));
