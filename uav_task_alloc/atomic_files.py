@@ -40,7 +40,8 @@ def replacing(path: Path) -> Iterator[Path]:
     """Within `with`, a result is written beside a file, which it replaces once it is complete.
 
     A link, a pipe and a device are written themselves, as is a file in a folder in which no
-    other one can be made. Nothing is synced to disk.
+    other one can be made. A file whose name cannot be given to another one, as of another user
+    in /tmp, or a mount point, is overwritten at the end. Nothing is synced to disk.
 
     Args:
         path: of the file; where `with` is left by an exception, it stays as it was.
@@ -60,7 +61,11 @@ def replacing(path: Path) -> Iterator[Path]:
         yield temporary
         if path.exists():
             shutil.copymode(path, temporary)
-        os.replace(temporary, path)
+        try:
+            os.replace(temporary, path)
+        except OSError:
+            shutil.copyfile(temporary, path)
+            temporary.unlink()
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise

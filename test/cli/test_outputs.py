@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Outputs and packages are checked before a command computes; an error names the option."""
+import errno
 import importlib.util
 import os
 import resource
@@ -205,6 +206,20 @@ def test_a_result_keeps_the_mode_of_the_file_that_it_replaces(tmp_path):
         file.write_text('new')
         assert path.read_text() == 'old'
     assert (path.read_text(), path.stat().st_mode & 0o777) == ('new', 0o640)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_is_a_mount_point_is_overwritten(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.EBUSY, 'Device or resource busy')
+
+    path = tmp_path / 'plan.json'
+    path.write_text('old')
+    monkeypatch.setattr(os, 'replace', refuse)
+    with replacing(path) as file:
+        file.write_text('new')
+        assert path.read_text() == 'old'
+    assert path.read_text() == 'new'
     assert list(tmp_path.iterdir()) == [path]
 
 
