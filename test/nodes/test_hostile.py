@@ -173,6 +173,18 @@ def test_a_node_that_receives_hostile_messages_plans_all_valid_tasks(node, numbe
     assert [i for i in good.ids if records[i].uav != 'good'] == []
 
 
+def test_a_node_whose_callbacks_always_take_long_does_step(node, monkeypatch):
+    node, steps = node[0], []
+    monkeypatch.setattr(node, 'leads', lambda: True)
+    monkeypatch.setattr(node, 'waits_for_subscribers', lambda _: False)
+    monkeypatch.setattr(node.core, 'tick', lambda *_: steps.append(1))
+    for _ in range(4):
+        for name in ('stepped_at', 'reads_until', 'pause_until'):  # 2 s pass
+            setattr(node, name, getattr(node, name) - 2.0)
+        node.on_step()
+    assert len(steps) == 2
+
+
 def test_hostile_topics_do_not_end_a_running_node(start, probe):
     process = start('allocator')
     good = Good()

@@ -59,7 +59,7 @@ from uav_task_alloc.zone_codec import decode_zone_array, refused_text
 _STEP_PERIOD = 0.025  # [s]
 _LOCK_TIMEOUT = 5.0  # [s] for the journal of an allocator that is exiting
 _SUBSCRIBER_TIMEOUT = 1.0  # [s] that the lists of the previous run wait for subscribers
-_BLOCKED, _READS = 1.0, 0.5  # [s] without a step; in which it then reads what has come
+_BLOCKED, _READS = 1.0, 0.5  # [s] without a step; in which it then reads what has come, once
 # a step is followed by a pause, in which messages are taken: a multiple of its duration
 _PAUSE_FACTOR, _LONGEST_PAUSE = 3.0, 0.2  # and at most [s]
 _MOST_LINES, _MOST_ROWS = 200, 500  # logged, and saved, per step
@@ -104,7 +104,7 @@ class AllocatorNode(Node):
         self.results: deque[ReplanAnswer | None] = deque()  # of the worker
         self.background = False  # the running solve is one between events
         self.pause_until = 0.0  # [s] steady clock
-        self.stepped_at = time.monotonic()
+        self.stepped_at = self.reads_until = time.monotonic()
         self.logged_conflict = ''  # of origins
         self.solver_error = ''  # of the last solve
         self.pending = False  # something is not yet saved or published
@@ -274,8 +274,8 @@ class AllocatorNode(Node):
         """Let time pass, start a solve where one is due, and publish changes."""
         now, stamp = time.monotonic(), self.stamp()
         stepped_at, self.stepped_at = self.stepped_at, now
-        if now - stepped_at > _BLOCKED:  # no UAV was silent for that: its reports wait
-            self.pause_until = now + _READS
+        if now - stepped_at > _BLOCKED and stepped_at >= self.reads_until:  # reports wait
+            self.pause_until = self.reads_until = now + _READS
         if not self.leads() or now < self.pause_until or self.waits_for_subscribers(now):
             return
         self.world.set_params(self.live.now, now)
