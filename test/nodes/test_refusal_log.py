@@ -30,8 +30,8 @@ def test_more_names_than_are_remembered_are_not_logged_again_with_each_message()
     log = Log()
     first = log.zones(1005)
     assert len(first) == 1001
-    assert first[-1] == ('threat_zones: zone z1000: radius = nan: ignored; those of more than '
-                         '1000 names are: the others are not logged')
+    assert first[-1] == ('threat_zones: zone z1000: radius = nan: ignored; messages of more '
+                         'than 1000 names are: the other names are not logged')
     for _ in range(59):
         log.now += 1.0
         assert log.zones(1005) == []

@@ -14,7 +14,7 @@ _KEPT = 60.0  # [s] after its last message in which a name makes no room for ano
 class RefusalLog:
     """Logs each reason once until `name` sends a valid message. O(1) memory for any flood.
 
-    A name that is refused while 1000 others are has no line: those would be logged again.
+    A name that is refused while 1000 others are has no line of its own.
 
     Args:
         log: writes one line.
@@ -44,8 +44,8 @@ class RefusalLog:
         if known is None and not self._has_room(now):
             if now - self._full >= _KEPT:
                 self._full = now
-                self._log(f'{topic}: {reason}: ignored; those of more than {_MOST_NAMES} names '
-                          'are: the others are not logged')
+                self._log(f'{topic}: {reason}: ignored; messages of more than {_MOST_NAMES} '
+                          'names are: the other names are not logged')
             return
         logged = known[0] if known else set()
         self._logged[topic, name] = logged, now
