@@ -59,7 +59,7 @@ class PathPreparation:
 
         Args:
             share: of the budget, in [0, 1].
-            most: units of work; 0: no limit.
+            most: units of work; 0: a straight leg only.
             heeds_stop: whether `stop` ends the searches.
         """
         elapsed = self._clock() - self._began
