@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.service import Service
@@ -25,12 +24,10 @@ from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.allocator.replanning.worker import Worker
 from uav_task_alloc.allocator.state.ground import read_ground
-from uav_task_alloc.allocator.status import health_values, health_warnings
 from uav_task_alloc.errors import InvalidValue, counted
 from uav_task_alloc.geometry.fence_area import area_corners
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes.conversions import announcements
-from uav_task_alloc.nodes.conversions.diagnostics import allocator_row, from_diagnostics
 from uav_task_alloc.nodes.conversions.messages import (
     INPUT_ANNOUNCEMENTS,
     INPUT_EVENTS,
@@ -40,8 +37,9 @@ from uav_task_alloc.nodes.conversions.messages import (
     to_report,
 )
 from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
+from uav_task_alloc.nodes.ros.allocator_diagnostics import AllocatorDiagnostics
 from uav_task_alloc.nodes.ros.batched_subscription import subscribe_batched
-from uav_task_alloc.nodes.ros.clock_watch import ClockOffsets, is_simulated, watch_clock
+from uav_task_alloc.nodes.ros.clock_watch import is_simulated
 from uav_task_alloc.nodes.ros.leader_election import LeaderElection
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.order_services import OrderServices
@@ -50,7 +48,6 @@ from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.refusal_log import RefusalLog
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
-from uav_task_alloc.nodes.ros.unheard_publishers import unheard_publishers
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.record.message_records import from_stamp
@@ -105,17 +102,12 @@ class AllocatorNode(Node):
         self.background = False  # the running solve is one between events
         self.pause_until = 0.0  # [s] steady clock
         self.stepped_at = self.reads_until = time.monotonic()
-        self.logged_conflict = ''  # of origins
-        self.solver_error = ''  # of the last solve
         self.pending = False  # something is not yet saved or published
         self.passive = False  # another allocator leads
         self.election = LeaderElection(self, self.world.lists, self.persistence.in_use)
         self._create_topics()
         self.result_ready = self.create_guard_condition(self.on_results)
         self.subscribers_by = time.monotonic() + _SUBSCRIBER_TIMEOUT
-        self.clock_watch = watch_clock(self, self.get_logger().warning)
-        self.offsets = ClockOffsets('reports')
-        self.refused_zones = ''  # of the last message
         self.worker = Worker(self.load_solver, self.solve, self.deliver, self.on_solver_error)
         self.worker.start()
 
@@ -126,7 +118,8 @@ class AllocatorNode(Node):
             self.live.now.fence_area, self.origin))
         self.orders = OrderServices(self, self.core, self.save, self.stamp,
                                     self.origins.conflict)
-        self.diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.diagnostics = AllocatorDiagnostics(self, self.core, self.persistence, self.origins,
+                                                self.election)
         self.inputs: list[Subscription[Any]] = [
             subscribe_batched(self, m.UavState, 'uav_states', self.on_state, INPUT_STATES),
             subscribe_batched(self, m.TaskAnnouncement, 'task_announcements', self.on_tasks,
@@ -177,7 +170,8 @@ class AllocatorNode(Node):
             if self.world.update_uav(report, now, stamp):
                 return  # there are too many UAVs, which the world reports once
             if not is_simulated(self):  # that clock is late, by as much as it is faster
-                self.offsets.add(report.uav_id, from_stamp(msg.header.stamp), stamp, now)
+                self.diagnostics.offsets.add(
+                    report.uav_id, from_stamp(msg.header.stamp), stamp, now)
             refusal = ''
         except InvalidValue as error:
             refusal = str(error)
@@ -193,9 +187,9 @@ class AllocatorNode(Node):
         try:
             zones, invalid = decode_zone_array(msg)
         except InvalidValue as error:
-            self.refused_zones = f'threat_zones refused: {error}'
+            self.diagnostics.refused_zones = f'threat_zones refused: {error}'
             return self.refusals.report('threat_zones', '', str(error))
-        self.refused_zones = refused_text(invalid)
+        self.diagnostics.refused_zones = refused_text(invalid)
         self.refusals.report('threat_zones', '', '')
         for zone in msg.zones:
             self.refusals.report('threat_zones', zone.zone_id, invalid.get(zone.zone_id, ''))
@@ -265,8 +259,9 @@ class AllocatorNode(Node):
 
     def on_solver_error(self, error: Exception) -> None:
         """Log why a solve has failed."""
-        self.solver_error = f'{type(error).__name__}: {error}'[:500]
-        self.get_logger().error(f'solver: {self.solver_error}', throttle_duration_sec=10.0)
+        text = f'{type(error).__name__}: {error}'[:500]
+        self.diagnostics.solver_error = text
+        self.get_logger().error(f'solver: {text}', throttle_duration_sec=10.0)
 
     # steps
 
@@ -320,7 +315,8 @@ class AllocatorNode(Node):
                 gc.freeze()  # collections need not traverse the compiler's objects
                 self.get_logger().info('ready')
                 continue
-            self.solver_error = self.solver_error if result is None else ''
+            if result is not None:
+                self.diagnostics.solver_error = ''
             self.core.adopt(result, time.monotonic(), self.stamp())
         if self.leads():
             self.publish(self.stamp())
@@ -359,28 +355,7 @@ class AllocatorNode(Node):
     def publish_diagnostics(self) -> None:
         """Publish warnings and figures, and compare the origins of the nodes."""
         self.origins.check()
-        conflict = self.origins.conflict()
-        stopped = self.election.trouble() or (conflict and f'refuses to plan: {conflict}')
-        if conflict != self.logged_conflict:
-            self.logged_conflict = conflict
-            self.get_logger().error(stopped if conflict else 'fleet_origin: all agree')
-        warnings = health_warnings(self.world, self.persistence.error, self.solver_error,
-                                   self.stamp())
-        now = time.monotonic()
-        warnings += filter(None, [self.clock_watch.warning(now), self.offsets.warning(now),
-                                  self.refused_zones])
-        warnings += unheard_publishers(self, {
-            'task_announcements': INPUT_ANNOUNCEMENTS, 'threat_zones': LATCHED,
-            'task_events': INPUT_EVENTS, 'fleet_origin': LATCHED})
-        sources = self.count_publishers('threat_zones')
-        warnings += [f'threat_zones has {sources} publishers: expected one, as each message '
-                     'replaces all zones'] if sources > 1 else []
-        self.diagnostics.publish(from_diagnostics([allocator_row(
-            self.get_fully_qualified_name(), [stopped] if stopped else warnings,
-            {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts(),
-                             self.core.batteries.texts(self.stamp()), self.core.waiting.texts()),
-             **self.election.facts()},
-            bool(stopped))], self.stamp()))
+        self.diagnostics.publish(self.stamp())
 
     def stamp(self) -> float:
         """The published clock [s]."""
