@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The thread of the worker, and the warm-up: callers never wait, exceptions do not end it."""
+import threading
 from queue import Queue
 
 from allocation import greedy
@@ -46,6 +47,18 @@ def test_a_running_solve_can_be_stopped_early():
     worker.stop_early()
     assert got.get(timeout=60).problem.trigger == 'x'
     worker.close()
+
+
+def test_a_worker_that_was_closed_while_it_prepared_delivers_nothing():
+    got, ready = Queue(), Queue()
+    worker = Worker(lambda: ready.get(timeout=60), lambda problem, stop: None, got.put, got.put)
+    before = {*threading.enumerate()}
+    worker.start()
+    thread, = {*threading.enumerate()} - before
+    worker.close()
+    ready.put(1)
+    thread.join(60)
+    assert got.empty()
 
 
 def test_a_failed_solve_is_reported_and_the_next_problem_is_solved():

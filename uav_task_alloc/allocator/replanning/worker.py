@@ -29,6 +29,7 @@ class Worker:
         self._problems: SimpleQueue[ReplanProblem | None] = SimpleQueue()
         self._stop = threading.Event()
         self._prepared = threading.Event()
+        self._delivers, self._closed = threading.Lock(), False
         self._thread = threading.Thread(target=self._run, args=(prepare,), daemon=True,
                                         name='solver')
 
@@ -50,7 +51,12 @@ class Worker:
         self._stop.set()
 
     def close(self) -> None:
-        """End the thread; waits at most 5 s for it, and not for kernels that are compiled."""
+        """End the thread; waits at most 5 s for it, and not for kernels that are compiled.
+
+        Nothing is delivered after that.
+        """
+        with self._delivers:
+            self._closed = True
         self._stop.set()
         self._problems.put(None)
         if self._prepared.is_set():
@@ -59,10 +65,15 @@ class Worker:
     def _run(self, prepare: Callable[[], object]) -> None:
         self._guarded(prepare)
         self._prepared.set()
-        self._deliver(None)
+        self._deliver_open(None)
         while (problem := self._problems.get()) is not None:
             answer = self._guarded(partial(self._solve, problem, self._stop.is_set))
-            self._deliver(answer if isinstance(answer, ReplanAnswer) else None)
+            self._deliver_open(answer if isinstance(answer, ReplanAnswer) else None)
+
+    def _deliver_open(self, answer: ReplanAnswer | None) -> None:
+        with self._delivers:
+            if not self._closed:
+                self._deliver(answer)
 
     def _guarded(self, work: Callable[[], object]) -> object:
         try:
