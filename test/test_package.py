@@ -203,8 +203,8 @@ def test_ctrl_c_in_make_build_shows_no_traceback_of_the_build(tmp_path):
 
 @pytest.mark.parametrize('name', ['dmeo', 'survey.yaml', ''])
 def test_make_demo_refuses_an_unknown_scenario_before_it_builds(name):
-    process = subprocess.run(['make', '-n', 'demo', f'SCENARIO={name}'], cwd=ROOT, text=True,
-                             capture_output=True, check=False)
+    process = subprocess.run(['make', '--no-print-directory', '-n', 'demo', f'SCENARIO={name}'],
+                             cwd=ROOT, text=True, capture_output=True, check=False)
     assert process.returncode == 2
     assert f'SCENARIO = {name}: expected one of' in process.stderr
     assert ' demo ' in process.stderr

@@ -27,7 +27,7 @@ def test_a_fence_of_another_station_makes_it_unavailable_until_it_is_removed(kin
     bench.store_by_another(StoredItem(0, d.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION, 9.0, 0.0, 0.0,
                                       0.0, 473900000, 85400000, 0.0))
     bench.settle(FenceState.FOREIGN)
-    assert 'points of another station' in bench.state().reason
+    assert '1 point of another station' in bench.state().reason
     bench.store_by_another()
     bench.settle()
     assert bench.state().available
