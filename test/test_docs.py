@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 import docs_commands
 import launch_stand_in
@@ -121,6 +121,8 @@ class Sandbox:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
             pytest.fail(f'{block}: does not end on Ctrl-C\n{log.read_text()}')
+        with suppress(ProcessLookupError):  # what the shell has left
+            os.killpg(process.pid, signal.SIGKILL)
         assert 'Traceback' not in log.read_text(), f'{block}:\n{log.read_text()}'
 
 

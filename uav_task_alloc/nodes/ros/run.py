@@ -28,7 +28,7 @@ from uav_task_alloc.parameter_field import CheckedParams
 from uav_task_alloc.parameter_texts import help_text
 
 CRASHED = 70  # exit status, EX_SOFTWARE of sysexits.h: the launch files restart the node
-_ENDS = 8.0  # [s] after which a node that is to end logs where it hangs
+_ENDS, _GIVES_UP = 8.0, 30  # [s] after which a node that is to end logs where it hangs; is ended
 # what ROS could not parse, by its own words
 _EXPECTED = {'parameter override rule': '-p NAME:=VALUE, a list with values of one type',
              'remap rule': '-r FROM:=TO', 'params file': 'a parameter file',
@@ -66,7 +66,8 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
 
     A node with a method `delays_exit` is spun on after a signal while that returns True.
     Exit status: 0 in order; 2 and one line for a command line that is invalid; 1 and one line
-    where the node refuses a parameter or cannot be started; CRASHED where a callback raises.
+    where the node refuses a parameter or cannot be started; CRASHED where a callback raises;
+    that of SIGALRM where it hangs at its end.
 
     Args:
         make_node: the node's class; its docstring is the text of `--help`.
@@ -89,17 +90,25 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
     except _REFUSALS as error:
         sys.exit(_one_line(error))
     finally:
-        faulthandler.dump_traceback_later(_ENDS, file=2)
+        _limit_end()
         for number in _end_signals():  # a second Ctrl-C must not cut this short
             signal.signal(number, signal.SIG_IGN)
         rclpy.try_shutdown()
         faulthandler.cancel_dump_traceback_later()
+        signal.alarm(0)
 
 
 def _end_signals() -> list[signal.Signals]:
     """Those that end a node; SIGHUP, of a terminal that is closed, not under `nohup`."""
     return [number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
             if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN]
+
+
+def _limit_end() -> None:
+    """Have SIGALRM end the process if it hangs: Fast DDS may wait for ever, with Python's lock."""
+    faulthandler.dump_traceback_later(_ENDS, file=2)
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.alarm(_GIVES_UP)
 
 
 def _spin(node: Node, threads: int, signals: list[int]) -> None:
@@ -113,7 +122,7 @@ def _spin(node: Node, threads: int, signals: list[int]) -> None:
     except Exception:
         traceback.print_exc()
         sys.exit(CRASHED)
-    faulthandler.dump_traceback_later(_ENDS, file=2)
+    _limit_end()
     executor.shutdown()
     node.destroy_node()
 
