@@ -169,6 +169,8 @@ class MavlinkBridge(Node):
         if conflict := self.origins.conflict():
             status = replace(status, available=False, reason=conflict)
         if self.published.is_due(status, measured_at, now, self.live.now.state_rate):
+            with self.lock:
+                session.executor.watch.save_record()  # what is reported is stored before
             self.states.publish(bridge_messages.from_uav_status(
                 status, self.capabilities.get(session.uav_id, ()),
                 self.stamp() - self.rate(session) * (now - measured_at),
