@@ -3,7 +3,6 @@
 import json
 import math
 import signal
-import socket
 import threading
 import time
 
@@ -26,6 +25,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     header,
     planned_task,
 )
+from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.sim.config import VehicleConfig
 from uav_task_alloc.sim.udp_fleet import UdpFleet
 
@@ -38,10 +38,8 @@ class Sky:
     """Two fast vehicles, a bridge, and what it publishes."""
 
     def __init__(self, start, probe, log, *args):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-            free.bind(('127.0.0.1', 0))
-            self.port = free.getsockname()[1]
         self.probe, self._start, self._args, self.log = probe, start, args, log
+        self.port = free_port()
         self.fleet = UdpFleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, (20.0 * n, 0.0, 0.0),
                                            arming_delay=0.0, floods=False), kind)
                             for n, kind in KINDS.items()], ('127.0.0.1', self.port), 10.0, log)
