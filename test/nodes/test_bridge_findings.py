@@ -81,6 +81,21 @@ def fact(health, name):
                  for array in health[-1:] for s in array.status if s.hardware_id == name), None)
 
 
+def test_the_authority_in_a_state_is_stored_before_it_is_published(bridge, monkeypatch):
+    """A message may have changed it since the last step, which stores it."""
+    one = bridge()
+    one.send(HEARTBEAT)
+    one.until(lambda: one.node.ground_station.sessions)
+    session, calls = one.node.ground_station.sessions[1], []
+    one.node.closing = True  # ends the thread that publishes
+    one.node.receiver.join(60.0)
+    session.executor.telemetry.position_at = time.monotonic()
+    monkeypatch.setattr(session.executor.watch, 'save_record', lambda: calls.append('stored'))
+    monkeypatch.setattr(one.node.states, 'publish', lambda _: calls.append('published'))
+    one.node.publish_state(session, time.monotonic())
+    assert calls == ['stored', 'published']
+
+
 def test_finding_12_a_heartbeat_thread_that_ends_is_reported_and_restarted(bridge, probe):
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
     one = bridge()

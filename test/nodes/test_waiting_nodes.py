@@ -57,7 +57,7 @@ def test_an_idle_uav_waits_where_tasks_came_from_and_leaves_for_one(start, probe
     probe.until(lambda: fleet.route('a') == ['t1'])
     assert not fleet.lists['a'].end_via
     answer = probe.call(Trigger, 'allocator/forget_demand', Trigger.Request())
-    assert (answer.success, answer.message) == (True, '21 announcements are forgotten')
+    assert (answer.success, answer.message) == (True, '21 announcements forgotten')
 
 
 def test_by_default_an_idle_uav_gets_no_list(start, probe, fleet):

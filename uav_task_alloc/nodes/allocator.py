@@ -224,9 +224,7 @@ class AllocatorNode(Node):
         """Forget where tasks were announced."""
         count = self.world.announced.seen.forget()
         self.save()
-        verb = 'is' if count == 1 else 'are'
-        response.success = True
-        response.message = f'{counted(count, "announcement")} {verb} forgotten'
+        response.success, response.message = True, f'{counted(count, "announcement")} forgotten'
         return response
 
     def on_availability(self, request: SetAvailability.Request,

@@ -21,10 +21,10 @@ export function make(tag, text = '', kind = '') {
   return put(document.createElement(tag), text, kind);
 }
 
-// Replace the children of a node only where its key differs from that of the last call. The focus
-// stays where it was, or at a button of the same text, or a summary of the same name.
 const nameOf = node => node.dataset.name ?? node.textContent;
 
+// Replace the children of a node only where its key differs from that of the last call. The focus
+// stays where it was, or at a button of the same text, or a summary of the same name.
 export function fill(node, key, nodes) {
   if (node.dataset.key === key) return;
   node.dataset.key = key;
@@ -179,7 +179,7 @@ export function showPlans(model) {
 
 const buttons = ids => ids.flatMap((id, k) => [k ? ', ' : '', taskButton(id)]);
 
-// The other tasks of a reason; made when it is opened, which it stays where they change.
+// The other tasks of a reason, made once it is opened; it stays open where they change.
 function moreNode(why, ids) {
   const node = make('details'), summary = make('summary', `${ids.length} more`);
   summary.dataset.name = `more ${why}`;

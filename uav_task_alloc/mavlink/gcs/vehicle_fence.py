@@ -248,7 +248,7 @@ class VehicleFence:
                      f'{counted(self.fence.points, "point")}')
         if state is FenceState.FOREIGN:
             text += (f', {counted(len(transfer.held or ()), "point")} of another station, left '
-                     'alone: remove them there to have the zones on board')
+                     'alone: clear the fence there to have the zones on board')
         if transfer.reason:
             text += f' ({transfer.reason})'
         return text

@@ -48,9 +48,12 @@ class ClockWatch:
         runs = 'runs again' if before > 0.0 else 'has begun'
         return f'/clock {runs} after {steady - since:.0f} s' if still else ''
 
-
     def warning(self, steady: float) -> str:
-        """Return that the clock stands still, and for how long; '' while it runs."""
+        """Return that the clock stands still, and for how long; '' while it runs.
+
+        Args:
+            steady: monotonic clock [s].
+        """
         if not self.still or self._last is None:
             return ''
         ros, since = self._last
