@@ -171,10 +171,12 @@ class MavlinkBridge(Node):
         if self.published.is_due(status, measured_at, now, self.live.now.state_rate):
             with self.lock:
                 session.executor.watch.save_record()  # what is reported is stored before
-            self.states.publish(bridge_messages.from_uav_status(
+            msg = bridge_messages.from_uav_status(
                 status, self.capabilities.get(session.uav_id, ()),
                 self.stamp() - self.rate(session) * (now - measured_at),
-                self.limits.get(session.uav_id)))
+                self.limits.get(session.uav_id))
+            self.others.note_own(msg)
+            self.states.publish(msg)
 
     def nominal_energy(self, uav_id: str) -> NominalEnergy:
         """What the parameters state about range, endurance and speed of a UAV."""
@@ -194,10 +196,12 @@ class MavlinkBridge(Node):
         if not self.receiver.is_alive():
             raise RuntimeError('receiver thread died; exiting')
         self.heartbeat.watch(time.monotonic())
+        self.others.search(time.monotonic())
         self.log.report_trouble('heartbeat', self.heartbeat.trouble)
         policy = bridge_parameters.to_policy(self.live.now, self.zones, self.grounded(),
                                              self.stamp(), zones_known=self.zones_known,
-                                             fence_area=self.fence_area, rally=self.rally)
+                                             fence_area=self.fence_area, rally=self.rally,
+                                             settling=self.others.settling(time.monotonic()))
         for session in list(self.ground_station.sessions.values()):
             session.executor.policy = policy
             if session.uav_id not in self.lists.known:
@@ -213,7 +217,9 @@ class MavlinkBridge(Node):
         """What a UAV on the ground waits for before a take-off; '' where it waits for nothing."""
         if self.origins.conflict():
             return 'nodes with one origin'
-        return 'another bridge, as this one exits' if self.exiting() else ''
+        if self.exiting():
+            return 'another bridge, as this one exits'
+        return self.others.grounded(time.monotonic())
 
     def exiting(self) -> bool:
         """Whether this bridge was asked to exit."""
@@ -274,7 +280,7 @@ class MavlinkBridge(Node):
         unheard = unheard_publishers(self, {'threat_zones': LATCHED, 'fleet_origin': LATCHED})
         rows += self.report.part_rows(self.origins.conflict(), unheard,
                                       self.holds.late.warning(now),
-                                      self.others.warning(sorted(self.lists.known), now),
+                                      self.others.warning(now),
                                       self.clock_watch.warning(now))
         self.diagnostics.publish(from_diagnostics(rows, stamp))
 

@@ -36,6 +36,21 @@ def test_without_takeoff_the_bridge_waits_for_a_pilot_and_logs_it_once(kind):
 
 
 @BOTH
+@pytest.mark.parametrize(('field', 'logged'), [('settling', []), ('grounded', ['waits for x'])])
+def test_a_list_waits_on_the_ground_for_what_its_policy_names(kind, field, logged):
+    bench = FlightBench(kind).discover()
+    executor = bench.executor()
+    executor.policy = dataclasses.replace(executor.policy, **{field: 'x'})
+    bench.assign(task_list('AB'))
+    bench.run(limit=30.0)
+    assert not bench.vehicles[1].flight.armed
+    assert [note for note in bench.notes if 'waits' in note] == logged
+    assert executor.sender.waits_for == 'x'
+    executor.policy = dataclasses.replace(executor.policy, **{field: ''})
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+
+
+@BOTH
 def test_a_list_that_shrinks_as_tasks_complete_needs_no_upload(kind):
     bench = flying(kind, 'ABC')
     for revision, (done, rest) in enumerate([('A', 'BC'), ('B', 'C')], 2):

@@ -79,7 +79,8 @@ class Takeoff:
 
     def _departure(self) -> str:
         """The departure that a vehicle on the ground waits for; '': it is due."""
-        return self._onboard.list.waits.grounded(self._policy().clock)
+        policy = self._policy()
+        return policy.settling or self._onboard.list.waits.grounded(policy.clock)
 
     def _zone_over_start(self) -> str:
         """The zone over its home, or where it stands, that it waits for; '': there is none."""

@@ -28,7 +28,7 @@ _HIGHEST_RALLY = 5000.0  # [m]
 def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
               grounded: str = '', clock: float = 0.0, *, zones_known: bool = False,
               fence_area: FenceShape | None = None,
-              rally: tuple[RallyPoint, ...] = ()) -> Policy:
+              rally: tuple[RallyPoint, ...] = (), settling: str = '') -> Policy:
     """Return what a mission executor may do now.
 
     Args:
@@ -39,13 +39,14 @@ def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
         zones_known: the zones were received.
         fence_area: that all vehicles stay in; None: none.
         rally: places to return to.
+        settling: what a first take-off waits for; '' where it waits for nothing.
 
     Returns:
         For all executors of the bridge.
     """
     return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign,
                   params.relaunch, zones, clock, grounded, params.fences, zones_known,
-                  fence_area, rally)
+                  fence_area, rally, settling)
 
 
 def to_fence_area(entries: Iterable[str], origin: Origin) -> FenceShape | None:

@@ -1,63 +1,105 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds other nodes that fly the task lists of a bridge's UAVs, too, as of a second fleet."""
+"""Finds other nodes that report the UAVs of a bridge, as the bridge of a second fleet."""
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
+import threading
+import time
+from collections import deque
 
 from rclpy.node import Node
+from rclpy.subscription import Subscription
+from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.errors import first_of
-from uav_task_alloc.nodes.ros.topic_names import TASK_LIST
+from uav_task_alloc.nodes.conversions.messages import STATES
 
-_UNKNOWN = '_NODE_NAME_UNKNOWN_'  # of an endpoint that was found before its node
-_PERIOD = 5.0  # [s] between two searches
-_PATIENCE = 30.0  # [s] that a bridge that was killed may still be found
+_TOPIC = 'uav_states'
+_SEARCH_PERIOD = 1.0  # [s]
+# [s] from the start in which other nodes are found: Fast DDS announces a node each 3 s, or 0.2 s
+SETTLING_TIME = 8.0
+_RECENT = 5.0  # [s] since the last report of another node
+_OWN_REPORTS = 500  # of the bridge that are told from others: more than its queue holds
 
 
 class OtherBridges:
-    """Warns where another node reports a UAV of the bridge, and takes its list.
+    """Finds whether another node reports UAVs of the bridge, too.
 
-    It would fly another vehicle along the same way: two fleets in one ROS system without
-    namespaces.
+    It would fly another vehicle along the same lists: two fleets in one ROS system without
+    namespaces. States are subscribed to only while another node publishes some.
 
     Args:
         node: the bridge, which publishes `uav_states`.
-        patience: [s] that another node has to be there before it is reported.
     """
 
-    def __init__(self, node: Node, patience: float = _PATIENCE) -> None:
-        self._node, self.patience = node, patience
-        self._searched = -math.inf  # [s] steady time
-        self._since: dict[str, float] = {}  # [s] steady time, by UAV
+    def __init__(self, node: Node) -> None:
+        self._node, self._began, self._searched = node, time.monotonic(), float('-inf')
+        self._subscription: Subscription[m.UavState] | None = None
+        self._lock = threading.Lock()  # of the next two: the bridge publishes in another thread
+        self._own: deque[tuple[str, int, int]] = deque(maxlen=_OWN_REPORTS)  # UAV, stamp
+        self._ids: set[str] = set()  # of UAVs that the bridge has reported
+        self._reported: dict[str, float] = {}  # [s] steady time, by UAV
 
-    def warning(self, uav_ids: Iterable[str], now: float) -> str:
-        """Return which UAVs another node flies, too.
+    def note_own(self, msg: m.UavState) -> None:
+        """Remember a state of the bridge.
 
         Args:
-            uav_ids: whose lists the bridge has subscribed to.
-            now: steady time [s].
-
-        Returns:
-            '' where none is, or not for long.
+            msg: about to be published.
         """
-        if now - self._searched >= _PERIOD:
-            self._searched = now
-            self._since = {uav_id: self._since.get(uav_id, now)
-                           for uav_id in self._shared(uav_ids)}
-        shared = [uav_id for uav_id, since in self._since.items() if now - since >= self.patience]
-        return (f'{first_of(shared)}: another node reports and flies UAVs of these ids, too, so '
-                'that two vehicles may fly one list: expected a namespace or ROS_DOMAIN_ID for '
-                'each fleet, or another uav_id_pattern') if shared else ''
+        with self._lock:
+            self._ids.add(msg.uav_id)
+            self._own.append(_key(msg))
 
-    def _shared(self, uav_ids: Iterable[str]) -> list[str]:
-        """The UAVs whose lists several publishers of `uav_states` subscribe to."""
-        node = self._node
-        if node.count_publishers(node.resolve_topic_name('uav_states')) < 2:
-            return []
-        reporters = {(each.node_namespace, each.node_name)
-                     for each in node.get_publishers_info_by_topic('uav_states')
-                     if each.node_name != _UNKNOWN}
-        return [uav_id for uav_id in uav_ids if sum(
-            (each.node_namespace, each.node_name) in reporters
-            for each in node.get_subscriptions_info_by_topic(TASK_LIST.format(uav_id))) > 1]
+    def search(self, now: float) -> None:
+        """Subscribe while another node publishes states; `now` is the steady time [s]."""
+        if now - self._searched < _SEARCH_PERIOD:
+            return
+        self._searched, node = now, self._node
+        others = node.count_publishers(node.resolve_topic_name(_TOPIC)) > 1
+        if others and self._subscription is None:
+            self._subscription = node.create_subscription(
+                m.UavState, _TOPIC, self._on_state, STATES)
+        elif not others and self._subscription is not None:
+            node.destroy_subscription(self._subscription)
+            self._subscription = None
+
+    def settling(self, now: float) -> str:
+        """Return what a first take-off waits for: others to be found; '' once they would be.
+
+        Args:
+            now: steady time [s].
+        """
+        return '' if now - self._began >= SETTLING_TIME else 'the search for other bridges'
+
+    def grounded(self, now: float) -> str:
+        """Return what a take-off waits for; '' where it waits for nothing.
+
+        Args:
+            now: steady time [s].
+        """
+        shared = self._shared(now)
+        return f'ids of its own: another node reports {first_of(shared)}, too' if shared else ''
+
+    def warning(self, now: float) -> str:
+        """Return which UAVs another node reports, too; '' where it reports none.
+
+        Args:
+            now: steady time [s].
+        """
+        shared = self._shared(now)
+        return (f'{first_of(shared)}: another node reports UAVs of these ids, too, so that two '
+                'vehicles may fly one list; none takes off: expected a namespace or '
+                'ROS_DOMAIN_ID for each fleet, or another uav_id_pattern') if shared else ''
+
+    def _on_state(self, msg: m.UavState) -> None:
+        with self._lock:
+            if msg.uav_id in self._ids and _key(msg) not in self._own:
+                self._reported[msg.uav_id] = time.monotonic()
+
+    def _shared(self, now: float) -> list[str]:
+        """The UAVs that another node has reported lately."""
+        with self._lock:
+            return sorted(uav_id for uav_id, at in self._reported.items() if now - at <= _RECENT)
+
+
+def _key(msg: m.UavState) -> tuple[str, int, int]:
+    return msg.uav_id, msg.header.stamp.sec, msg.header.stamp.nanosec
