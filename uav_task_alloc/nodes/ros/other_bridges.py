@@ -18,7 +18,7 @@ _SEARCH_PERIOD = 1.0  # [s]
 # [s] from the start in which other nodes are found: Fast DDS announces a node each 3 s, or 0.2 s
 SETTLING_TIME = 8.0
 _RECENT = 5.0  # [s] since the last report of another node
-_OWN_REPORTS = 500  # of the bridge that are told from others: more than its queue holds
+_OWN_REPORTS = 500  # of the bridge, to tell them from others; its queue is shorter
 
 
 class OtherBridges:
