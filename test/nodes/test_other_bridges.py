@@ -76,7 +76,7 @@ def test_a_bridge_whose_uavs_another_node_reports_starts_none_and_says_so(whole,
 
     whole.until(warned)
     assert whole.log['warning'][0].startswith('uav_ids: uav_1: another node reports UAVs of these')
-    reason = 'ids of its own: another node reports uav_1, too'
+    reason = 'ids of its own: another node reports UAVs of this bridge, too'
     assert whole.node.grounded() == reason
     whole.until(lambda: [session.executor.policy.grounded for session in list(
         whole.node.ground_station.sessions.values())] == [reason])

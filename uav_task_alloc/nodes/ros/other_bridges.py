@@ -76,8 +76,8 @@ class OtherBridges:
         Args:
             now: steady time [s].
         """
-        shared = self._shared(now)
-        return f'ids of its own: another node reports {first_of(shared)}, too' if shared else ''
+        return ('ids of its own: another node reports UAVs of this bridge, too'
+                if self._shared(now) else '')
 
     def warning(self, now: float) -> str:
         """Return which UAVs another node reports, too; '' where it reports none.
