@@ -85,6 +85,22 @@ def test_a_full_disk_is_logged_once_and_written_to_when_there_is_room(disk):
     assert len(disk.again()) == 301
 
 
+def test_a_disk_that_is_back_is_no_error_only_when_all_is_written(disk):
+    database = disk.persistence._journal._db
+    database.execute('PRAGMA max_page_count = 3')
+    for k in range(300):
+        disk.add(f't{k}')
+    database.execute('PRAGMA max_page_count = 1000000')
+    disk.driver.now += 10.0
+    errors = []
+    while not disk.persistence.save(disk.driver.core, disk.driver.now, 100):
+        errors.append(disk.persistence.error)
+    assert errors and all(errors)
+    assert disk.persistence.error == ''
+    assert len(disk.again()) == 300
+    assert len(disk.errors) == 1
+
+
 def test_files_that_may_not_grow_are_logged_once_and_written_later(tmp_path):
     done = subprocess.run([sys.executable, '-c', FULL, str(tmp_path)], text=True, check=True,
                           stdout=subprocess.PIPE, env={

@@ -166,8 +166,10 @@ class Persistence:
             self._retry = now + _RETRY
             self._set_error(f'{error}; tried again every {_RETRY:g} s')
         else:
-            self._set_error('')
-            return allocator.written(rows)
+            is_saved = allocator.written(rows)
+            if is_saved:  # what is left was accepted without a disk
+                self._set_error('')
+            return is_saved
         return True
 
     def _write(self, rows: list[JournalRow], allocator: Saveable) -> list[JournalRow]:
