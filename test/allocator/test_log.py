@@ -2,6 +2,7 @@
 """The log of the allocator: a line for each plan, and for each task accepted, refused or done."""
 from allocation import AllocatorDriver
 
+from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.records import AnnouncementAction
 from uav_task_alloc.allocator.status import health_warnings
 from uav_task_alloc.model import Task
@@ -44,6 +45,14 @@ def test_the_finish_counts_from_now():
     driver.settle()
     line = next(note for note in reversed(driver.notes) if note.startswith('plan '))
     assert 'finish in 36 s' in line  # with half a stop and a whole one
+
+
+def test_the_finish_is_not_named_before_the_uavs_have_reported():
+    driver = AllocatorDriver(restored_state(fleet().core.rows()))
+    driver.core.tick(driver.now, driver.now)
+    driver.take()
+    [line] = [note for note in driver.notes if note.startswith('plan ')]
+    assert line == 'plan 2 (restart): 2 tasks on 1 UAV; 400 m, solved in 0 ms'
 
 
 def test_each_task_has_a_line_when_it_is_accepted_refused_started_and_done():

@@ -2,6 +2,7 @@
 """Status for operators: of each task, and of the allocator as warnings and key values."""
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -81,10 +82,13 @@ def last_finish(world: World, stamp: float) -> float:
         stamp: published clock [s].
 
     Returns:
-        [s]; 0.0 where no UAV has tasks.
+        [s]; 0.0 where no UAV has tasks, NaN where one with tasks has not reported.
     """
-    flights = {uav_id: flight for uav_id in world.lists_in_force()
+    lists = world.lists_in_force()
+    flights = {uav_id: flight for uav_id in lists
                if (flight := world.flights.of(uav_id, stamp))}
+    if any(each.stops and uav_id not in flights for uav_id, each in lists.items()):
+        return math.nan
     return max((finish_time(world.lists.restamped(uav_id, stamp, flight), flight)
                 for uav_id, flight in flights.items()), default=0.0)
 
@@ -94,7 +98,7 @@ def allocation_line(allocation: Allocation, finish: float) -> str:
 
     Args:
         allocation: as published.
-        finish: time until the last UAV has flown its list [s].
+        finish: time until the last UAV has flown its list [s]; NaN: not known.
 
     Returns:
         Trigger, tasks, length, finish and solve time.
@@ -102,9 +106,10 @@ def allocation_line(allocation: Allocation, finish: float) -> str:
     plan = allocation.plan
     counts = [len(each.stops) for each in allocation.lists if each.stops]
     left_out = f', {len(plan.unassigned)} left out' if plan.unassigned else ''
+    ends = '' if math.isnan(finish) else f'finish in {finish:.0f} s, '
     return (f'plan {allocation.revision} ({allocation.trigger}): '
             f'{counted(sum(counts), "task")} on {counted(len(counts), "UAV")}{left_out}; '
-            f'{plan.distance:.0f} m, finish in {finish:.0f} s, '
+            f'{plan.distance:.0f} m, {ends}'
             f'solved in {1e3 * plan.solve_time:.0f} ms')
 
 

@@ -95,7 +95,8 @@ def test_a_disk_that_is_back_is_no_error_only_when_all_is_written(disk):
     errors = []
     while not disk.persistence.save(disk.driver.core, disk.driver.now, 100):
         errors.append(disk.persistence.error)
-    assert errors and all(errors)
+    assert errors
+    assert all(errors)
     assert disk.persistence.error == ''
     assert len(disk.again()) == 300
     assert len(disk.errors) == 1
