@@ -363,7 +363,7 @@ class AllocatorNode(Node):
         """End the worker, save, and release the journal."""
         self.worker.close()
         self.orders.close()
-        self.save()
+        self.persistence.save_last(self.core)
         self.persistence.close()
         super().destroy_node()
 

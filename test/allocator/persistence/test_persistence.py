@@ -102,6 +102,16 @@ def test_a_disk_that_is_back_is_no_error_only_when_all_is_written(disk):
     assert len(disk.errors) == 1
 
 
+def test_what_a_full_disk_cannot_take_at_the_end_is_logged(disk):
+    disk.add('t1')
+    read_only(disk)
+    disk.add('t2', 't3')
+    disk.persistence.save_last(disk.driver.core)
+    [_, last] = disk.errors
+    assert last.endswith(' rows of the journal could not be written before the end')
+    assert disk.again() == {'t1'}
+
+
 def test_files_that_may_not_grow_are_logged_once_and_written_later(tmp_path):
     done = subprocess.run([sys.executable, '-c', FULL, str(tmp_path)], text=True, check=True,
                           stdout=subprocess.PIPE, env={

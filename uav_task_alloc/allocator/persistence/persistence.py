@@ -172,6 +172,18 @@ class Persistence:
             return is_saved
         return True
 
+    def save_last(self, allocator: Saveable) -> None:
+        """Write what is new at the end of a run, without a rest after a failure.
+
+        Args:
+            allocator: whose rows are written; how many could not be is logged.
+        """
+        self._retry = 0.0
+        self.save(allocator, 0.0)
+        if self._present_error and (rows := allocator.rows()):
+            self._log_error(f'{counted(len(rows), "row")} of the journal could not be written '
+                            'before the end')
+
     def _write(self, rows: list[JournalRow], allocator: Saveable) -> list[JournalRow]:
         """Write rows, or the whole world where nothing is on disk; returns what was written."""
         if self._journal is None:

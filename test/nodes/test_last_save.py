@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An allocator that ends writes what a disk refused a moment before."""
+import pytest
+import rclpy
+from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs.srv import SubmitTasks
+
+from uav_task_alloc.allocator.persistence.persistence import Persistence
+from uav_task_alloc.nodes.allocator import AllocatorNode
+
+pytestmark = pytest.mark.ros
+
+
+def test_a_task_accepted_while_the_disk_failed_is_saved_at_the_end(domain, tmp_path):
+    rclpy.init(args=['--ros-args', '-p', f'state_dir:={tmp_path}', '--log-level', 'fatal'])
+    node = AllocatorNode()
+    database = node.persistence._journal._db
+    database.execute('PRAGMA query_only = ON')
+    announced = m.TaskAnnouncement(tasks=[m.Task(task_id='t1', value=1.0)])
+    response = node.on_submit(SubmitTasks.Request(announcement=announced), SubmitTasks.Response())
+    assert response.accepted == ['t1']
+    node.persistence._retry += 1000.0  # it is not tried again in time
+    database.execute('PRAGMA query_only = OFF')
+    node.destroy_node()
+    rclpy.shutdown()
+    saved = Persistence(str(tmp_path), print).saved
+    assert [record.task.id for record in saved.tasks] == ['t1']
