@@ -52,6 +52,24 @@ def test_a_first_plan_and_a_tight_world_with_zones_find_all_kernels_loaded():
     assert run(SCRIPT).stdout == 'late:\nlate:\n'
 
 
+SERVED = LOADED + """
+from uav_task_alloc.solver import tables
+
+load_kernels(zones=True)
+before = loaded()
+uavs = [Uav(f'u{i}', (10.0 * i, 0.0, 0.0)) for i in range(6)]
+tasks = [Task(f't{i}', (10.0 * i, 40.0 + 7.0 * (i % 5), 0.0)) for i in range(40)]
+dome = ThreatZone.hemisphere('dome', (150.0, 50.0, 0.0), 2.0)
+print(len(plan(uavs, tasks, [dome], max_iterations=2000).unassigned))
+print('late:', *sorted(loaded() - before))
+print(len(tables._copy_known_rows.signatures))  # of scouts that go on from learnt tables
+"""
+
+
+def test_a_world_with_zones_whose_tasks_are_all_served_finds_all_kernels_loaded():
+    assert run(SERVED).stdout == '0\nlate:\n1\n'
+
+
 LATE = LOADED + """
 load_timed_kernels()
 before = loaded()

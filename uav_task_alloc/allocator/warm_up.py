@@ -20,7 +20,7 @@ from uav_task_alloc.solver.solve import load_kernels
 from uav_task_alloc.solver.timed.solve import load_timed_kernels
 
 _BUDGET = 0.05  # [s] of each solve
-_WORK = KernelWork(51.5, 373)
+_WORK = KernelWork(51.5, 368)
 _ZONES = (
     ThreatZone.hemisphere('dome', (100.0, 0.0, 0.0), 30.0),
     ThreatZone.cylinder('column', (300.0, 0.0), 30.0, 0.0, 100.0),

@@ -36,7 +36,7 @@ def main(argv: Sequence[str]) -> int:
     from uav_task_alloc.solver.solve import plan
     from uav_task_alloc.solver.timed.solve import load_timed_kernels
     with NOTICE.shown_on(sys.stderr), NOTICE.until_loaded(
-            'all', KernelWork(79.0, 481), whole=True):
+            'all', KernelWork(79.0, 489), whole=True):
         compile_kernels(plan, AllocatorParams())
         load_timed_kernels(zones=True, large=True, few=True)  # with time
         load_timed_kernels(zones=True, paths=True)  # of lines, areas and orbits

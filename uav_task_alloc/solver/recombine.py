@@ -239,12 +239,15 @@ def load_packing(a: Arrays) -> None:
     pack_routes(pool, reduced, uavs, uavs, 1.0, 1, uavs.copy())
 
 
-def load_repacking(a: Arrays, routes: Routes) -> None:
-    """Call the kernels of `repack` once, so that they are compiled.
+def load_recombination(a: Arrays, routes: Routes) -> None:
+    """Call the kernels of `recombine` and `repack` once, so that they are compiled.
 
     Args:
         a: any problem.
         routes: any of its routes; they are cleared.
     """
     load_packing(a)
-    _write(a, empty_pool(a), np.full(a.uavs, -1), routes)
+    pool, flown = empty_pool(a), np.full(a.uavs, -1)
+    reduced, _ = reduced_costs(a, pool, flown, 0.0, 0.0)
+    _improve(a, pool, reduced, 0, flown, routes.uav_of.copy(), routes)
+    _write(a, pool, flown, routes)

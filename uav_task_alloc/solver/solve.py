@@ -28,12 +28,13 @@ from uav_task_alloc.solver.check import (
 from uav_task_alloc.solver.insertion import place_all
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
 from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
-from uav_task_alloc.solver.recombine import load_repacking
+from uav_task_alloc.solver.recombine import load_recombination
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.savings import offer_first
 from uav_task_alloc.solver.search import trim_to_range
 from uav_task_alloc.solver.separated import separated_plan
+from uav_task_alloc.solver.tables import fresh_tables, to_learnt
 from uav_task_alloc.solver.timed.solve import solve_timed
 from uav_task_alloc.solver.warm import WarmState, repair
 
@@ -198,7 +199,8 @@ def _call_kernels(solver: str, zones: bool, search: bool) -> None:
     place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two are only called
     if rounds:
         trim_to_range(problem.arrays, recorder.best)  # where ranges do not suffice
-        load_repacking(problem.arrays, recorder.best)
+        load_recombination(problem.arrays, recorder.best)
+        fresh_tables(problem, to_learnt(problem, fresh_tables(problem)))
     if zones:
         problem.distances.offer_path(0, len(uavs), ())
         find_detour(tasks[1].position, uavs[1].position, between, budget=paths.path_budget)
