@@ -78,7 +78,7 @@ class Takeoff:
                 and bool(self._onboard.remaining().stops))
 
     def _departure(self) -> str:
-        """The departure that a vehicle on the ground waits for; '': it is due."""
+        """What a vehicle on the ground waits for, no fault; '': its departure is due."""
         policy = self._policy()
         return policy.settling or self._onboard.list.waits.grounded(policy.clock)
 

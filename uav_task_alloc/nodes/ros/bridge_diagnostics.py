@@ -94,7 +94,7 @@ class BridgeDiagnostics:
             conflict: why the origins of the nodes differ; '' where they agree.
             unheard: a sentence for each publisher that is not received.
             late_hold: what is wrong with a hold that expires too early; '' where none does.
-            shared_ids: which UAVs another node flies, too; '' for none.
+            shared_ids: which UAVs another node reports, too; '' for none.
             still_clock: that simulated time stands still, which was logged; '' while it runs.
         """
         refusal = conflict and f'refuses to fly new lists: {conflict}'

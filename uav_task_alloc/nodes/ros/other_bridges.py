@@ -2,6 +2,7 @@
 """Finds other nodes that report the UAVs of a bridge, as the bridge of a second fleet."""
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -32,9 +33,9 @@ class OtherBridges:
     """
 
     def __init__(self, node: Node) -> None:
-        self._node, self._began, self._searched = node, time.monotonic(), float('-inf')
+        self._node, self._began, self._searched = node, time.monotonic(), -math.inf
         self._subscription: Subscription[m.UavState] | None = None
-        self._lock = threading.Lock()  # of the next two: the bridge publishes in another thread
+        self._lock = threading.Lock()  # of the next three: the bridge publishes in another thread
         self._own: deque[tuple[str, int, int]] = deque(maxlen=_OWN_REPORTS)  # UAV, stamp
         self._ids: set[str] = set()  # of UAVs that the bridge has reported
         self._reported: dict[str, float] = {}  # [s] steady time, by UAV
