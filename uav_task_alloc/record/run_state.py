@@ -288,12 +288,6 @@ class RunState:
         # two nodes read /clock up to a tick apart
         return stamp if -self.stretch <= wall - stamp < MAX_STAMP_AGE else float(wall)
 
-    def finish(self, uav: str) -> float | None:
-        """When the last task of a UAV's list ends [unix s]; None: it has none."""
-        line = self.lists.get(uav)
-        last = self.service(line, line['tasks'][-1]) if line and line['tasks'] else None
-        return None if last is None else last.end
-
     def begins_leg(self, line: Line) -> bool:
         """Whether a list has another first task than the newest list of its UAV."""
         before = self.lists.get(line['uav'])
