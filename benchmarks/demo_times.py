@@ -33,7 +33,7 @@ def start_errors(out: Path) -> list[float]:
     state, truth = read_run(out)
     reached = served(state, truth)
     starts = {name: reached[name][0].wall - state.tasks[name].service
-              for name in state.completed() if reached[name]}
+              for name in state.statuses.completed() if reached[name]}
     predicted: dict[str, float] = {}
     for line in read_lines(out / RECORD_FILE):
         if line['kind'] == 'statuses':

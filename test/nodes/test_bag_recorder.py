@@ -162,7 +162,7 @@ def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp
         for line in BagReader(path):
             run.apply({'wall': 0.0, **line})
         return run.solves and 'uav_1' in run.lists and run.lists['uav_1']['tasks'] and any(
-            row.reason == reason for row in run.statuses.values())
+            row.reason == reason for row in run.statuses.tasks.values())
     probe.until(recorded)
     view.stop()
     allocator.stop()

@@ -81,7 +81,7 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     assert state_of_run.tasks['t1'].position == (10.0, 20.0, 30.0)
     lines = read_lines(tmp_path / 'out/record.jsonl')
     assert next(line for line in lines if line['kind'] == 'announcement')['stamp'] == 5.0
-    assert state_of_run.statuses['t1'] == ReportedStatus('COMPLETED', 'uav_1', '')
+    assert state_of_run.statuses.tasks['t1'] == ReportedStatus('COMPLETED', 'uav_1', '')
     assert [(solve.milliseconds, solve.trigger) for solve in state_of_run.solves] == [
         (pytest.approx(100.0), '1 new task')]
     assert state_of_run.uavs['uav_1']['mode'] == 'STANDBY'

@@ -259,12 +259,12 @@ def test_tasks_that_the_allocator_has_forgotten_count_as_they_ended():
 
 def test_a_task_that_a_restarted_allocator_does_not_know_says_so_until_it_is_announced_again():
     run = run_state(*DONE, status(('a', 'ACTIVE'), ('b', 'PENDING')), status(('b', 'PENDING')))
-    known = run.known_statuses()
+    known = run.statuses.known()
     assert known['a'].reason.startswith('the allocator does not know it any more')
     assert (known['a'].state, known['b'].reason) == ('PENDING', '')
     run = run_state(*DONE, status(('a', 'ACTIVE')), status(), announced('ADD', 'a'),
                     status(('a', 'ACTIVE')))
-    assert run.known_statuses()['a'].state == 'ACTIVE'
+    assert run.statuses.known()['a'].state == 'ACTIVE'
 
 
 def test_a_run_is_not_over_before_the_last_event_of_its_scenario():

@@ -100,7 +100,7 @@ def test_flown_pieces_that_the_allocator_has_forgotten_are_known_until_their_tas
                  rows(2.0, field='COMPLETED', field_1='COMPLETED', field_2='COMPLETED'),
                  rows(3.0), rows(4.0)):
         run.apply(line)
-    assert {name: row.state for name, row in run.known_pieces().items()} == {
+    assert {name: row.state for name, row in run.statuses.known_pieces().items()} == {
         'field#1': 'COMPLETED', 'field#2': 'COMPLETED'}
     run.apply({**add, 'wall': 5.0})
-    assert run.known_pieces() == {}
+    assert run.statuses.known_pieces() == {}

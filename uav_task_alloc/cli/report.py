@@ -53,7 +53,7 @@ def summarise(out_dir: str | Path) -> Summary:
 def run_summary(state: RunState, truth: GroundTruth) -> Summary:
     """The key figures of a run; a task counts as completed only if a vehicle was there."""
     reached, passes = served(state, truth), piece_passes(state, truth)
-    known = state.known_statuses()
+    known = state.statuses.known()
     fates = {name: fate(name, state, bool(reached[name])) for name in state.tasks}
     names = {kind: sorted(name for name, its_fate in fates.items() if its_fate == kind)
              for kind in ('completed', 'unassigned', 'cancelled', 'lost')}
@@ -109,7 +109,7 @@ def finish(state: RunState, reached: Mapping[str, Sequence[Reached]],
 
 def fate(name: str, state: RunState, reached: bool) -> str:
     """`completed`, `unassigned`, `cancelled` or `lost`; `reached`: a vehicle was at the task."""
-    status = state.status(name)
+    status = state.statuses.last(name)
     if status is not None and status.state == 'COMPLETED' and reached:
         return 'completed'
     if status is not None and status.state in _LEFT_OUT and status.reason:
@@ -120,7 +120,7 @@ def fate(name: str, state: RunState, reached: bool) -> str:
 
 def why_lost(name: str, state: RunState) -> str:
     """The last status of a lost task."""
-    status = state.status(name)
+    status = state.statuses.last(name)
     if status is None:
         return 'no status'
     if status.state == 'COMPLETED':
@@ -130,9 +130,10 @@ def why_lost(name: str, state: RunState) -> str:
 
 def planned_length(state: RunState, completed: Sequence[str]) -> float:
     """Length [m] of the legs to completed tasks and home, as planned when each became next."""
-    known = state.known_statuses()
+    known = state.statuses.known()
     rows = {**{name: known[name] for name in completed}, **{
-        piece: row for piece, row in state.known_pieces().items() if row.state == 'COMPLETED'}}
+        piece: row for piece, row in state.statuses.known_pieces().items()
+        if row.state == 'COMPLETED'}}
     legs = [state.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
     return math.fsum(legs) + state.ways_home.total()
 
@@ -221,7 +222,7 @@ def warn_of_ends(out: Path, run: RunState, truth: GroundTruth) -> None:
     for name in (RECORD_FILE, TRUTH_FILE):
         for text in filter(None, [unfinished(out / name)]):
             log_line(f'Warning: {name} {text}')
-    known = run.known_statuses()
+    known = run.statuses.known()
     still = sum(name not in known or known[name].state not in FINAL_STATES for name in run.tasks)
     if still:
         log_line(f'Warning: {RECORD_FILE} ends while {still} of {len(run.tasks)} tasks are open')

@@ -196,7 +196,7 @@ class FlightHistory:
         if line is None:
             return
         after = route_lists(line)
-        changed = changes_text(route_changes(self.routes, after, self.run.completed()))
+        changed = changes_text(route_changes(self.routes, after, self.run.statuses.completed()))
         self.routes = after
         self.replans.append(ReplanRecord(
             line['wall'], line['revision'], trigger_text(line['trigger']), changed,
@@ -227,13 +227,13 @@ class FlightHistory:
 
     def tasks(self) -> dict[str, Point | None]:
         """All tasks announced or with a status, and their positions [m] where known."""
-        names = {**dict.fromkeys(self.run.tasks), **dict.fromkeys(self.run.statuses)}
+        names = {**dict.fromkeys(self.run.tasks), **dict.fromkeys(self.run.statuses.tasks)}
         announced = {name: task.position for name, task in self.run.tasks.items()}
         return {name: self.positions.get(name) or announced.get(name) for name in names}
 
     def status(self, task: str) -> ReportedStatus:
         """The last status of a task."""
-        return self.run.status(task) or ReportedStatus('PENDING', '', 'no status received')
+        return self.run.statuses.last(task) or ReportedStatus('PENDING', '', 'no status received')
 
     def lost(self) -> dict[str, TrueSample]:
         """The last position of each UAV that fell silent in flight and stayed silent.
@@ -253,7 +253,7 @@ class FlightHistory:
 
     def mission_end(self) -> float:
         """When the last task ended [unix s]; the end of the recording while tasks are open."""
-        present = self.run.statuses.keys() | self.run.pieces.keys()  # not those cut again
+        present = self.run.statuses.present()  # not those cut again
         ends = [spans[-1] for name, spans in self.spans.items() if name in present]
         if not ends or any(span.state in _OPEN_STATES for span in ends):
             return self.run.last

@@ -256,7 +256,7 @@ def _task_row(history: FlightHistory, task: str) -> tuple[Cell, ...]:
 
 def _uav_row(history: FlightHistory, uav: str) -> tuple[Cell, ...]:
     state = history.run.uavs[uav]
-    ended = (*map(history.status, history.tasks()), *history.run.known_pieces().values())
+    ended = (*map(history.status, history.tasks()), *history.run.statuses.known_pieces().values())
     done = sum(status.uav == uav and status.state == 'COMPLETED' and not status.pieces
                for status in ended)
     silent = sum(gap.until - gap.since for gap in history.gaps if gap.uav == uav)

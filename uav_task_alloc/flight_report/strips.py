@@ -45,7 +45,7 @@ def piece_rows(history: FlightHistory) -> list[FlownPiece]:
     Returns:
         In the order of tasks and numbers.
     """
-    pieces = history.run.known_pieces()
+    pieces = history.run.statuses.known_pieces()
     names = {name for name in (*history.listed, *pieces) if split_piece(name)[1]}
     tracks = _segments(history)
     rows = []

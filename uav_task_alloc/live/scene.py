@@ -117,7 +117,7 @@ class Scene:
         """The log entry of a plan: its changes to the plan before."""
         after = route_lists(line)
         is_first = self.routes is None
-        rows = route_changes(self.routes or {}, after, self.run.completed())
+        rows = route_changes(self.routes or {}, after, self.run.statuses.completed())
         self.routes = after
         trigger = trigger_text(line['trigger'])
         if rows:
@@ -150,7 +150,7 @@ class Scene:
             return {task: to_decimetres(row.position) for task, row in run.tasks.items()}
         if name == 'statuses':  # [state, UAV, reason] by id
             return {task: [row.state, row.uav, row.reason]
-                    for task, row in run.known_statuses().items()}
+                    for task, row in run.statuses.known().items()}
         if name == 'times':
             return self.times()
         if name == 'works':
@@ -243,13 +243,13 @@ class Scene:
         for name, task in run.tasks.items():
             if not task.work:
                 continue
-            status = run.status(name)
+            status = run.statuses.last(name)
             found[name] = {
                 'kind': task.work, 'path': [to_decimetres(point) for point in task.path],
                 'holes': [[to_decimetres(point) for point in hole] for hole in task.holes],
                 'radius': task.radius, 'done': status.done if status else 0,
                 'pieces': status.pieces if status else 0, 'strips': [], 'by': {}}
-        for piece, status in run.known_pieces().items():
+        for piece, status in run.statuses.known_pieces().items():
             whole, _ = split_piece(piece)
             if status.state == 'COMPLETED' and whole in found:
                 by = found[whole]['by']

@@ -126,7 +126,7 @@ def flight_shapes(run: RunState, tracks: Mapping[str, Sequence[TrueSample]]) -> 
     """
     tasks = []
     for name, task in run.tasks.items():
-        status = run.status(name)
+        status = run.statuses.last(name)
         row = {'state': status.state, 'flown_by': status.uav} if status else {'state': 'no status'}
         tasks.append(MapShape(name, 'tasks', 'Point', (task.position,), {
             'kind': 'task', 'altitude': task.position[2], **row},

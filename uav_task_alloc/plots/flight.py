@@ -50,7 +50,8 @@ def _tracks(figure: MapFigure, state: RunState, truth: GroundTruth,
         figure.route(points, index)
         figure.home(points[0], uav, index)
         done = sum(status.state == 'COMPLETED' and status.uav == uav and not status.pieces
-                   for status in (*state.statuses.values(), *state.known_pieces().values()))
+                   for status in (*state.statuses.tasks.values(),
+                                  *state.statuses.known_pieces().values()))
         text = f'{uav}: {style.task_count(done)}, {polyline_length(points) / 1e3:.1f} km'
         handles.append(style.route_handle(index, text))
     for uav, sample in truth.died.items():
@@ -79,6 +80,6 @@ def _tasks(figure: MapFigure, state: RunState, truth: GroundTruth,
 
 
 def _title(state: RunState, truth: GroundTruth) -> str:
-    done, out = state.count('COMPLETED'), state.count('UNASSIGNED', 'REJECTED')
+    done, out = state.statuses.count('COMPLETED'), state.statuses.count('UNASSIGNED', 'REJECTED')
     return (f'{done} of {len(state.tasks)} tasks completed, {out} unassigned; '
             f'{len(truth.tracks)} UAVs, {truth.metres() / 1e3:.1f} km flown')

@@ -47,11 +47,12 @@ def announcement_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
 def _changes_nothing(state: RunState, line: Line, row: Line) -> bool:
     """Whether an allocator refuses what is announced of a task, or has done it before."""
     task_id, action = row['id'], line['action']
-    known, status = state.tasks.get(task_id), state.statuses.get(task_id)
+    known, status = state.tasks.get(task_id), state.statuses.tasks.get(task_id)
     if action == 'CANCEL':
         return status is not None and status.state in ('COMPLETED', 'CANCELLED')
     if action == 'UPDATE' and status is None:  # not announced, or forgotten
-        return task_id in state.ended or (known is None and bool(state.statuses))
+        return state.statuses.is_forgotten(task_id) or (
+            known is None and bool(state.statuses.tasks))
     if action == 'UPDATE' and status is not None and status.state == 'REJECTED':
         return True
     now = line['wall'] - state.allocators.lead.seconds
@@ -63,7 +64,7 @@ def status_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
     """Tasks in a new state; tasks of the same state, UAV and reason share a sentence."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for row in line['statuses']:
-        old = state.statuses.get(row['task']) or state.pieces.get(row['task'])
+        old = state.statuses.in_newest(row['task'])
         if row['state'] in STATE_SENTENCES and (
                 old is None or (old.state, old.reason) != (row['state'], row['reason'])):
             groups.setdefault((row['state'], row['uav'], row['reason']), []).append(row['task'])

@@ -33,7 +33,7 @@ def served(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]]:
     """
     points = {name: state.places.get(name, task.position)
               for name, task in state.tasks.items() if not task.work}
-    owners = {name: status.uav for name, status in state.known_statuses().items()
+    owners = {name: status.uav for name, status in state.statuses.known().items()
               if status.state == 'COMPLETED'}
     found = visits(truth, points, state.waited, owners)
     passes = piece_passes(state, truth)
@@ -61,7 +61,7 @@ def piece_passes(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]
     tracks = {uav: [TrueSample(wall, point) for wall, point in resampled(track)]
               for uav, track in truth.tracks.items()}
     return {piece: _of_piece(tracks, truth, state.ways[piece])
-            for piece, status in state.known_pieces().items()
+            for piece, status in state.statuses.known_pieces().items()
             if status.state == 'COMPLETED' and piece in state.ways}
 
 

@@ -23,12 +23,13 @@ def headline(run: RunState, clock: float) -> str:
     Returns:
         Without a line break.
     """
-    counts = ''.join(f', {run.count(state)} {state.lower()}' for state in (
+    counts = ''.join(f', {run.statuses.count(state)} {state.lower()}' for state in (
         'ACTIVE', 'ASSIGNED', 'PENDING', 'UNASSIGNED', 'REJECTED', 'FAILED', 'CANCELLED')
-        if run.count(state))
+        if run.statuses.count(state))
     zones = len(run.zones_now())
-    text = (f'{clock:5.0f} s  {run.count("COMPLETED")} of {len(run.tasks)} tasks completed'
-            f'{counts}; {counted(zones, "zone")}')
+    completed = run.statuses.count('COMPLETED')
+    text = (f'{clock:5.0f} s  {completed} of {len(run.tasks)} tasks completed{counts}; '
+            f'{counted(zones, "zone")}')
     if run.solves:
         replans = run.replans()
         last = (replans or run.solves[:1])[-1]  # a plan that changed nothing is no re-plan
@@ -91,7 +92,7 @@ def run_is_over(run: RunState, scenario: Scenario, clock: float) -> bool:
     dead = {uav.id for uav in scenario.uavs if uav.dies_at is not None}
     return (clock > scenario.duration
             and run.tasks.keys() >= {timed.task.id for timed in scenario.tasks}
-            and all((status := run.status(name)) and status.state in FINAL_STATES
+            and all((status := run.statuses.last(name)) and status.state in FINAL_STATES
                     for name in run.tasks)
             and all(uav.id in dead or _at_rest(run.uavs.get(uav.id), run.lists.get(uav.id))
                     for uav in scenario.uavs))

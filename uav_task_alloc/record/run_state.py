@@ -11,7 +11,6 @@ from uav_task_alloc.geometry.fence_area import AreaCorners
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point, ThreatZone
-from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.allocator_reports import ALLOCATOR_SILENT, AllocatorReports
 from uav_task_alloc.record.bridge_reports import BridgeReports
 from uav_task_alloc.record.clock_comparison import (
@@ -23,16 +22,15 @@ from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lis
 from uav_task_alloc.record.record_file import RECORD_FILE, Line, read_lines
 from uav_task_alloc.record.reported import (
     END_STATES,
-    UNKNOWN_TASK,
     AnnouncedTask,
     ReportedAuthority,
-    ReportedStatus,
     Service,
     SolveRecord,
     ZoneInterval,
     announced_task,
     is_refused,
 )
+from uav_task_alloc.record.task_statuses import TaskStatuses
 from uav_task_alloc.record.ways_home import WaysHome
 from uav_task_alloc.zone_codec import decode_zone
 
@@ -46,17 +44,13 @@ class RunState:
 
     Arguments of methods:
         line: of a record.
-        states: names of TaskStatus constants.
         wall: [unix s].
         uav: id.
     """
 
     tasks: dict[str, AnnouncedTask] = field(default_factory=dict)  # announced, by id
     cancelled: set[str] = field(default_factory=set)  # ids of tasks
-    statuses: dict[str, ReportedStatus] = field(default_factory=dict)  # by task id
-    ended: dict[str, ReportedStatus] = field(default_factory=dict)  # forgotten tasks, by id
-    pieces: dict[str, ReportedStatus] = field(default_factory=dict)  # by id of the piece
-    flown_pieces: dict[str, ReportedStatus] = field(default_factory=dict)  # forgotten, likewise
+    statuses: TaskStatuses = field(default_factory=TaskStatuses)  # and those of pieces
     places: dict[str, Point] = field(default_factory=dict)  # [m] of listed tasks, by id
     ways: dict[str, list[Point]] = field(default_factory=dict)  # [m] of listed pieces, by id
     planned: dict[str, Service] = field(default_factory=dict)  # by task, of legs begun
@@ -128,17 +122,14 @@ class RunState:
                 self.cancelled.add(task['id'])
             else:
                 known = self.tasks.get(task['id'])
-                status = self.statuses.get(task['id'])
+                status = self.statuses.tasks.get(task['id'])
                 now = line['wall'] - self.allocators.lead.seconds
                 if known and status and is_refused(known, status, task, line['action'], now):
                     continue
                 if line['action'] == 'ADD':
                     self.cancelled.discard(task['id'])
-                    if self.ended.pop(task['id'], None):  # forgotten, and now a new task
+                    if self.statuses.forget_former(task['id']):
                         known = None
-                        self.flown_pieces = {
-                            piece: row for piece, row in self.flown_pieces.items()
-                            if split_piece(piece)[0] != task['id']}
                 self.tasks[task['id']] = announced_task(
                     task, known.wall if known else self._announced_at(line))
                 self.begun = min(self.begun, self.tasks[task['id']].wall)
@@ -163,28 +154,10 @@ class RunState:
         Returns:
             Whether it has ended in the first statuses of the record, and since then.
         """
-        old = self.statuses.get(row['task']) or self.pieces.get(row['task'])
+        old = self.statuses.in_newest(row['task'])
         return row['state'] in END_STATES and (
-            old.state == row['state'] if old else not self.statuses and self._in_opening(line))
-
-    def status(self, task: str) -> ReportedStatus | None:
-        """Return the last status of a task.
-
-        Args:
-            task: id.
-
-        Returns:
-            Also of one that the allocator has forgotten since; None: there was none.
-        """
-        return self.statuses.get(task) or self.ended.get(task)
-
-    def known_statuses(self) -> dict[str, ReportedStatus]:
-        """The last status of each task, also of those that the allocator has forgotten."""
-        return {**self.ended, **self.statuses}
-
-    def known_pieces(self) -> dict[str, ReportedStatus]:
-        """The last status of each piece, also of flown ones that the allocator has forgotten."""
-        return {**self.flown_pieces, **self.pieces}
+            old.state == row['state'] if old
+            else not self.statuses.tasks and self._in_opening(line))
 
     def on_statuses(self, line: Line) -> None:
         """The statuses of all tasks."""
@@ -195,19 +168,7 @@ class RunState:
                 task = self.tasks.get(row['task'])
                 service = task.service / self.speedup if task else 0.0
                 self.flown[row['task']] = Service(row['uav'], line['wall'] - service, line['wall'])
-        rows = {row['task']: ReportedStatus(row['state'], row['uav'], row['reason'],
-                                            row.get('done', 0), row.get('pieces', 0))
-                for row in line['statuses']}
-        self.ended.update((task, row if row.state in END_STATES else UNKNOWN_TASK)
-                          for task, row in self.statuses.items()
-                          if row.state in END_STATES or task not in rows)
-        for task in rows.keys() & self.ended.keys():
-            del self.ended[task]
-        before = {**self.flown_pieces, **self.pieces}
-        self.flown_pieces = {piece: row for piece, row in before.items()
-                             if row.state == 'COMPLETED' and piece not in rows}
-        self.pieces = {task: row for task, row in rows.items() if split_piece(task)[1]}
-        self.statuses = {task: row for task, row in rows.items() if task not in self.pieces}
+        self.statuses.apply(line)
 
     def on_allocation(self, line: Line) -> None:
         """A plan was published: by now the tasks completed before the one before it are known."""
@@ -218,7 +179,8 @@ class RunState:
     def replans(self) -> list[SolveRecord]:
         """The plans after the first that changed a list; a completed task is no change."""
         newest, before = self.routes
-        changed = self.solves[1:] and route_changes(before, newest, self.completed())
+        changed = self.solves[1:] and route_changes(
+            before, newest, self.statuses.completed())
         return [*self.changing, *self.solves[-1:]] if changed else self.changing
 
     def on_proposal(self, line: Line) -> None:
@@ -349,15 +311,6 @@ class RunState:
         """Uploads begun, by the bridges' counts; without one, the list revisions seen on board."""
         begun = self.bridges.uploads
         return sum(map(len, self.verified.values())) if begun is None else begun
-
-    def count(self, *states: str) -> int:
-        """Number of tasks in one of these states."""
-        return sum(status.state in states for status in self.known_statuses().values())
-
-    def completed(self) -> set[str]:
-        """Ids of the completed tasks and pieces."""
-        return {task for task, status in {**self.known_statuses(), **self.pieces}.items()
-                if status.state == 'COMPLETED'}
 
     def start(self) -> float:
         """Time of the first announced task [unix s]; of the first line where there is none."""
