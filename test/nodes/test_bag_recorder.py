@@ -161,7 +161,8 @@ def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp
         run = RunState()
         for line in BagReader(path):
             run.apply({'wall': 0.0, **line})
-        return run.solves and 'uav_1' in run.lists and run.lists['uav_1']['tasks'] and any(
+        newest = run.lists.newest.get('uav_1')
+        return run.solves and newest and newest['tasks'] and any(
             row.reason == reason for row in run.statuses.tasks.values())
     probe.until(recorded)
     view.stop()

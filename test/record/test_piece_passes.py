@@ -87,7 +87,7 @@ def test_a_second_pass_without_items_at_both_ends_leads_elsewhere(items, twice):
 @pytest.mark.parametrize(('speedup', 'passes'), [(5, 1), (1, 0)])
 def test_a_corner_that_is_overshot_for_a_moment_does_not_end_a_pass(speedup, passes):
     made = run()
-    made.ways['field#1'] = [(0.0, 40.0, 50.0), (20.0, 40.0, 50.0), (20.0, 60.0, 50.0),
+    made.lists.ways['field#1'] = [(0.0, 40.0, 50.0), (20.0, 40.0, 50.0), (20.0, 60.0, 50.0),
                             (200.0, 60.0, 50.0)]
     truth = flown((-20, 40), (38, 40), (20, 62), (200, 60), (200, 80), (-20, 80))
     truth.tracks['u1'] = [replace(each, wall=each.wall / speedup) for each in truth.tracks['u1']]
@@ -135,7 +135,7 @@ def test_a_lost_vehicle_has_flown_a_strip_where_it_reached_the_end(items, twice,
 
 def test_a_short_way_that_is_crossed_on_the_way_elsewhere_is_not_flown():
     made = run()
-    made.ways['field#1'] = [(50.0, 40.0, 50.0), (67.0, 41.0, 50.0)]
+    made.lists.ways['field#1'] = [(50.0, 40.0, 50.0), (67.0, 41.0, 50.0)]
     truth = flown((62, 10), (54, 70), (54, 100), (20, 40), (90, 43))
     [reached] = piece_passes(made, truth)['field#1']
     assert reached.wall > 60.0

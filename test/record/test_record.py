@@ -103,7 +103,7 @@ def test_a_zone_is_in_force_from_the_first_set_with_it_to_the_first_without():
 def test_the_planned_leg_of_a_task_is_that_when_it_became_the_next():
     run = run_state(tasks_left('a', 'b', leg=100.0), tasks_left('a', 'b', leg=40.0),
                tasks_left('b', leg=70.0), tasks_left())
-    assert run.legs == {('u1', 'a'): 100.0, ('u1', 'b'): 70.0}
+    assert run.lists.legs == {('u1', 'a'): 100.0, ('u1', 'b'): 70.0}
 
 
 def test_uploads_are_revisions_on_board_unless_a_bridge_counts_them():
@@ -304,7 +304,7 @@ def test_the_places_of_waits_are_those_of_the_task_and_of_the_stop_before():
             for name, wait in (('a', 0.0), ('b', 12.0), ('c', 0.0))]
     run.apply({'kind': 'list', 'wall': 1.0, 'uav': 'u1', 'revision': 1, 'distance': 0.0,
                'stamp': 1.0, 'tasks': rows})
-    assert run.waited == {'a', 'b'}
+    assert run.lists.waited == {'a', 'b'}
 
 
 def test_a_record_that_is_there_already_is_moved_and_never_overwritten(tmp_path):

@@ -134,8 +134,8 @@ def planned_length(state: RunState, completed: Sequence[str]) -> float:
     rows = {**{name: known[name] for name in completed}, **{
         piece: row for piece, row in state.statuses.known_pieces().items()
         if row.state == 'COMPLETED'}}
-    legs = [state.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
-    return math.fsum(legs) + state.ways_home.total()
+    legs = [state.lists.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
+    return math.fsum(legs) + state.lists.ways_home.total()
 
 
 def percentile(values: Sequence[float], share: float) -> float:

@@ -40,7 +40,7 @@ def flight_map(history: FlightHistory) -> Any:
         x, y = zip(*corners, corners[0], strict=True)
         figure.add_scatter(x=x, y=y, mode='lines', name='fence_area', hoverinfo='name',
                            line={'color': RED, 'width': 2.0, 'dash': 'dash'})
-    for k, uav in enumerate(sorted(history.tracks.keys() | history.run.lists.keys())):
+    for k, uav in enumerate(sorted(history.tracks.keys() | history.run.lists.newest.keys())):
         flown = [sample.point for sample in history.tracks.get(uav, ())]
         legs = [point for leg in history.planned.get(uav, ()) for point in (*leg, None)]
         for points, name, colour, dash, width in (
@@ -55,7 +55,7 @@ def flight_map(history: FlightHistory) -> Any:
                 textposition='bottom center', showlegend=False, hoverinfo='text',
                 marker={'symbol': 'square', 'size': 12, 'color': uav_colour(k),
                         'line': {'width': 1, 'color': 'black'}})
-    add_pieces(figure, history, sorted(history.tracks.keys() | history.run.lists.keys()))
+    add_pieces(figure, history, sorted(history.tracks.keys() | history.run.lists.newest.keys()))
     _add_tasks(figure, history)
     _add_lost(figure, history)
     figure.update_xaxes(title='east [m]')

@@ -181,7 +181,7 @@ class FlightHistory:
             owners = self.listed.setdefault(row['id'], [])
             if owners[-1:] != [uav]:
                 owners.append(uav)
-        if self.run.begins_leg(line) and self.tracks.get(uav):
+        if self.run.lists.begins_leg(line) and self.tracks.get(uav):
             leg = [self.tracks[uav][-1].point, *self.points(tasks[:1])]
             self.planned.setdefault(uav, []).append(leg)
 
@@ -221,7 +221,7 @@ class FlightHistory:
 
     def remaining(self, uav: str) -> list[Point]:
         """The route [m] that a UAV had left at the end, from its last position."""
-        line, track = self.run.lists.get(uav), self.tracks.get(uav)
+        line, track = self.run.lists.newest.get(uav), self.tracks.get(uav)
         points = list(self.points(line['tasks'])) if line else []
         return [track[-1].point, *points] if track and points else points
 

@@ -50,7 +50,7 @@ def piece_rows(history: FlightHistory) -> list[FlownPiece]:
     tracks = _segments(history)
     rows = []
     for name in sorted(names, key=split_piece):
-        status, way = pieces.get(name), history.run.ways.get(name, ())
+        status, way = pieces.get(name), history.run.lists.ways.get(name, ())
         state = status.state if status else 'CUT AGAIN'
         share = float(np.mean(_flown(way, tracks)[1])) if len(way) > 1 else None
         rows.append(FlownPiece(

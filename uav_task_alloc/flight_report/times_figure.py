@@ -69,7 +69,7 @@ def _bars(history: FlightHistory) -> Iterable[_Bar]:
         if planned is not None:
             yield bar('planned', flown.uav, task, planned.begin, planned.end)
         yield bar('flown', flown.uav, task, flown.begin, flown.end)
-    for uav, line in run.lists.items():
+    for uav, line in run.lists.newest.items():
         for row in line['tasks']:
             service = run.service(line, row)
             if service is not None and row['id'] not in run.flown:

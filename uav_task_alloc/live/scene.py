@@ -75,7 +75,7 @@ class Scene:
         # arrivals and windows are other times then
         if (self.run.speedup, self.run.allocators.lead.seconds) != clocks:
             self.dirty |= {'times', *(
-                f'list {uav}' for uav, each in self.run.lists.items() if each['tasks'])}
+                f'list {uav}' for uav, each in self.run.lists.newest.items() if each['tasks'])}
 
     def updates(self, now: float, ended: bool = False,
                 ) -> tuple[dict[str, Any], list[LogEntry], list[LogEntry]]:
@@ -223,7 +223,7 @@ class Scene:
 
         `waits`: points to where it waits for tasks.
         """
-        line, speedup = self.run.lists[uav], self.run.speedup
+        line, speedup = self.run.lists.newest[uav], self.run.speedup
         planned_at = self.run.planned_at(line)
         waits = [to_decimetres(point) for point in line.get('waits', ())]
         return {'revision': line['revision'], **({'waits': waits} if waits else {}), 'tasks': [
@@ -254,8 +254,9 @@ class Scene:
             if status.state == 'COMPLETED' and whole in found:
                 by = found[whole]['by']
                 by[status.uav] = by.get(status.uav, 0) + 1
-                if piece in run.ways:
-                    found[whole]['strips'].append([to_decimetres(p) for p in run.ways[piece]])
+                way = run.lists.ways.get(piece)
+                if way is not None:
+                    found[whole]['strips'].append([to_decimetres(point) for point in way])
         return found
 
     def times(self) -> LogEntry:

@@ -110,6 +110,7 @@ class LiveView(Node):
         self.params = declare(self, LiveViewParams).now
         self.played = scenario.load(self.params.scenario) if self.params.scenario else None
         self.state = RunState()
+        self.with_lists: set[str] = set()  # UAVs to whose task lists it subscribes
         self.held: deque[m.TaskAnnouncement] = deque()  # until the origin is known
         self.logged_refusals: set[tuple[str, str]] = set()  # topic and reason
         self.scene, self.snapshots = Scene(self.state), SnapshotStore()
@@ -169,7 +170,7 @@ class LiveView(Node):
 
     def subscribe_list(self, uav_id: str) -> None:
         """Subscribe to the task lists of a UAV."""
-        self.state.lists[uav_id] = {'tasks': [], 'distance': 0.0}
+        self.with_lists.add(uav_id)
         try:
             topic = check_topic(self, TASK_LIST, uav_id)
         except InvalidValue as error:  # its state is shown nevertheless
@@ -222,7 +223,7 @@ class LiveView(Node):
         """Record a state that differs in more than its position at once, others twice a second."""
         if not is_ros_name(msg.uav_id):
             return  # the allocator reports it
-        if msg.uav_id not in self.state.lists:
+        if msg.uav_id not in self.with_lists:
             self.subscribe_list(msg.uav_id)
         line = self.line(message_records.state_record(msg))
         last = self.state.uavs.get(msg.uav_id)

@@ -64,7 +64,7 @@ def _tasks(figure: MapFigure, state: RunState, truth: GroundTruth,
     reached = served(state, truth)
     for piece, rows in piece_passes(state, truth).items():
         if rows:
-            figure.way(state.ways[piece], uav_colour(indices[rows[0].uav]))
+            figure.way(state.lists.ways[piece], uav_colour(indices[rows[0].uav]))
     for name, task in state.tasks.items():
         for outline in (task.path, *task.holes):
             figure.outline(outline, closed=task.work == 'AREA')

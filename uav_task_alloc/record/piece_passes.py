@@ -31,11 +31,11 @@ def served(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]]:
         By task id: of a point each visit; of work in pieces the end of the last pass, where
         vehicles flew along all its completed pieces, else none.
     """
-    points = {name: state.places.get(name, task.position)
+    points = {name: state.lists.places.get(name, task.position)
               for name, task in state.tasks.items() if not task.work}
     owners = {name: status.uav for name, status in state.statuses.known().items()
               if status.state == 'COMPLETED'}
-    found = visits(truth, points, state.waited, owners)
+    found = visits(truth, points, state.lists.waited, owners)
     passes = piece_passes(state, truth)
     for name in state.tasks.keys() - points.keys():
         of_work = [rows for piece, rows in passes.items() if split_piece(piece)[0] == name]
@@ -60,9 +60,9 @@ def piece_passes(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]
     """
     tracks = {uav: [TrueSample(wall, point) for wall, point in resampled(track)]
               for uav, track in truth.tracks.items()}
-    return {piece: _of_piece(tracks, truth, state.ways[piece])
+    return {piece: _of_piece(tracks, truth, state.lists.ways[piece])
             for piece, status in state.statuses.known_pieces().items()
-            if status.state == 'COMPLETED' and piece in state.ways}
+            if status.state == 'COMPLETED' and piece in state.lists.ways}
 
 
 def _of_piece(tracks: Mapping[str, Sequence[TrueSample]], truth: GroundTruth,

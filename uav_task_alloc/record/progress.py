@@ -50,7 +50,7 @@ def fleet_lines(run: RunState, now: float) -> list[str]:
     """
     lines = []
     for uav, state in sorted(run.uavs.items()):
-        remaining = run.lists.get(uav, {'tasks': []})['tasks']
+        remaining = run.lists.newest.get(uav, {'tasks': []})['tasks']
         activity = 'silent' if now - state['wall'] > run.silent_after else state['mode'].lower()
         battery = state['battery']
         lines.append(
@@ -94,7 +94,7 @@ def run_is_over(run: RunState, scenario: Scenario, clock: float) -> bool:
             and run.tasks.keys() >= {timed.task.id for timed in scenario.tasks}
             and all((status := run.statuses.last(name)) and status.state in FINAL_STATES
                     for name in run.tasks)
-            and all(uav.id in dead or _at_rest(run.uavs.get(uav.id), run.lists.get(uav.id))
+            and all(uav.id in dead or _at_rest(run.uavs.get(uav.id), run.lists.newest.get(uav.id))
                     for uav in scenario.uavs))
 
 

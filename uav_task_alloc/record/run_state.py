@@ -9,8 +9,7 @@ from statistics import median
 
 from uav_task_alloc.geometry.fence_area import AreaCorners
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.geometry.polyline import polyline_length
-from uav_task_alloc.model import Point, ThreatZone
+from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record.allocator_reports import ALLOCATOR_SILENT, AllocatorReports
 from uav_task_alloc.record.bridge_reports import BridgeReports
 from uav_task_alloc.record.clock_comparison import (
@@ -30,8 +29,8 @@ from uav_task_alloc.record.reported import (
     announced_task,
     is_refused,
 )
+from uav_task_alloc.record.reported_lists import ReportedLists
 from uav_task_alloc.record.task_statuses import TaskStatuses
-from uav_task_alloc.record.ways_home import WaysHome
 from uav_task_alloc.zone_codec import decode_zone
 
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
@@ -51,8 +50,6 @@ class RunState:
     tasks: dict[str, AnnouncedTask] = field(default_factory=dict)  # announced, by id
     cancelled: set[str] = field(default_factory=set)  # ids of tasks
     statuses: TaskStatuses = field(default_factory=TaskStatuses)  # and those of pieces
-    places: dict[str, Point] = field(default_factory=dict)  # [m] of listed tasks, by id
-    ways: dict[str, list[Point]] = field(default_factory=dict)  # [m] of listed pieces, by id
     planned: dict[str, Service] = field(default_factory=dict)  # by task, of legs begun
     flown: dict[str, Service] = field(default_factory=dict)  # by task, of completed ones
     solves: list[SolveRecord] = field(default_factory=list)  # in the order of publication
@@ -61,10 +58,7 @@ class RunState:
     routes: tuple[RouteLists, RouteLists] = ({}, {})  # of the newest plan and that before it
     # with the times in which they were in force
     zones: list[ZoneInterval] = field(default_factory=list)
-    waited: set[str] = field(default_factory=set)  # tasks at which a UAV waits for the next
-    lists: dict[str, Line] = field(default_factory=dict)  # the newest of each UAV
-    legs: dict[tuple[str, str], float] = field(default_factory=dict)  # [m], see on_list
-    ways_home: WaysHome = field(default_factory=WaysHome)  # as planned
+    lists: ReportedLists = field(default_factory=ReportedLists)  # of tasks, by UAV
     uavs: dict[str, Line] = field(default_factory=dict)  # the newest state of each
     verified: dict[str, set[int]] = field(default_factory=dict)  # list revisions on board, by UAV
     bridges: BridgeReports = field(default_factory=BridgeReports)  # what they report of UAVs
@@ -209,24 +203,13 @@ class RunState:
                        if zone not in in_force]
 
     def on_list(self, line: Line) -> None:
-        """A task list; the leg to a task is taken from the list in which it became the first."""
-        if self.begins_leg(line):
+        """A task list; the service of a task is that of the list in which it became the first."""
+        if self.lists.begins_leg(line):
             first = line['tasks'][0]
-            self.legs[line['uav'], first['id']] = first['leg_distance'] + polyline_length(
-                first.get('way', ()))
             service = self.service(line, first)
             if service is not None:
                 self.planned[first['id']] = service
-        rows = line['tasks']
-        self.ways.update((row['id'], row['way']) for row in rows if 'way' in row)
-        self.places.update((row['id'], tuple(row['position'])) for row in rows
-                           if None not in row.get('position', (None,)))
-        for before, row in zip((None, *rows), rows, strict=False):
-            if row.get('wait', 0.0) > 0.0:
-                self.waited |= {row['id']} | ({before['id']} if before else set())
-        uav = line['uav']
-        self.ways_home.note_list(line, self.lists.get(uav), self.uavs.get(uav, {}).get('mode', ''))
-        self.lists[uav] = line
+        self.lists.apply(line, self.uavs.get(line['uav'], {}).get('mode', ''))
 
     def service(self, line: Line, row: Line) -> Service | None:
         """Return the planned service of a task of a list.
@@ -249,12 +232,6 @@ class RunState:
         wall, stamp = line['wall'], line.get('stamp', 0.0) + self.allocators.lead.seconds
         # two nodes read /clock up to a tick apart
         return stamp if -self.stretch <= wall - stamp < MAX_STAMP_AGE else float(wall)
-
-    def begins_leg(self, line: Line) -> bool:
-        """Whether a list has another first task than the newest list of its UAV."""
-        before = self.lists.get(line['uav'])
-        old = before['tasks'][0]['id'] if before and before['tasks'] else None
-        return bool(line['tasks']) and line['tasks'][0]['id'] != old
 
     def on_state(self, line: Line) -> None:
         """The state of one UAV."""
