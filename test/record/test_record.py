@@ -82,15 +82,15 @@ def rates(**by_uav):
 ])
 def test_the_clock_of_a_run_is_measured_where_no_speedup_is_given(given, measured, speedup):
     run = run_state(('run', {'speedup': given}), announced('ADD', 'a'), rates(**measured))
-    assert run.speedup == speedup
+    assert run.scale.speedup == speedup
     assert run.clock(5.0) == pytest.approx(4.0 * speedup)
 
 
 def test_a_measured_clock_does_not_follow_small_changes():
     run = run_state(('run', {'speedup': 0.0}), rates(u1=5.5), rates(u1=5.6), rates(u1=5.4))
-    assert run.speedup == 5.5
+    assert run.scale.speedup == 5.5
     run.apply({'wall': 9.0, 'kind': 'uploads', 'uploads': {}, 'clock_rates': {'u1': 20.1}})
-    assert run.speedup == 20.0
+    assert run.scale.speedup == 20.0
 
 
 def test_a_zone_is_in_force_from_the_first_set_with_it_to_the_first_without():

@@ -81,7 +81,7 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
         'metres_planned': round(planned_length(state, names['completed']), 1),
         'finish_s': finish(state, reached, names['completed']),
         'uavs_lost': len(truth.died),
-        'wall_s': round(max(0.0, state.last - state.first) / state.stretch, 1)
+        'wall_s': round(max(0.0, state.last - state.first) / state.scale.second, 1)
         if state.solves else 0.0,
         'unassigned': {name: known[name].reason for name in names['unassigned']},
         'lost': {name: why_lost(name, state) for name in names['lost']},

@@ -229,7 +229,7 @@ def reception_figure(history: FlightHistory) -> Any:
         figure.add_bar(
             y=[names.index(uav) for uav, _, _ in spans], orientation='h', name=title,
             base=[history.clock(since) for _, since, _ in spans],
-            x=[(until - since) * history.run.speedup for _, since, until in spans],
+            x=[(until - since) * history.run.scale.speedup for _, since, until in spans],
             hovertemplate='%{base:.1f} s for %{x:.1f} s<extra></extra>',
             marker={'color': colour}, width=0.6)
     figure.update_layout(barmode='overlay')

@@ -164,9 +164,10 @@ class FlightHistory:
         if None in (*old['velocity'], *line['velocity']):
             return True
         speed = max(math.hypot(*state['velocity']) for state in (old, line))
-        time = (after.wall - before.wall) * self.run.speedup
+        time = (after.wall - before.wall) * self.run.scale.speedup
+        delay = _DELAY * self.run.scale.rate
         return math.dist(before.point, after.point) <= (
-            speed * (time + _DELAY * self.run.rate) + 0.5 * _ACCELERATION * time * time + _ERROR)
+            speed * (time + delay) + 0.5 * _ACCELERATION * time * time + _ERROR)
 
     def on_list(self, line: Line) -> None:
         """Record the leg to a task that has become the next, from the position of the UAV."""

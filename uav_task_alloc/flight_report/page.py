@@ -126,9 +126,10 @@ def time_text(history: FlightHistory) -> str:
     if not history.tasks() or not all(map(math.isfinite, (run.first, run.last))):
         return 'All times are in seconds since the first message; no task was announced.'
     begin, end = (f'{history.clock(wall):.0f} s' for wall in (run.first, run.last))
-    fast = f' One second of the clock is {run.speedup:g} s of the mission.' if (
-        run.speedup != 1.0) else (f' It was flown {run.rate:g} times faster than real time.'
-                                  if run.rate != 1.0 else '')
+    scale = run.scale
+    fast = f' One second of the clock is {scale.speedup:g} s of the mission.' if (
+        scale.speedup != 1.0) else (f' It was flown {scale.rate:g} times faster than real time.'
+                                    if scale.rate != 1.0 else '')
     close = history.mission_end()
     why = 'the last task ended' if close < run.last else 'the recording ended with open tasks'
     return (f'All times are mission time: 0 s is the first task announced, at '
@@ -174,7 +175,7 @@ def key_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
          round(max(0.0, history.clock(history.mission_end())), 1)),
         ('last task completed at [s]', _last_flown(history, history.run.flown)),
         ('recorded, of mission time [s]',
-         round((history.run.last - history.run.first) * history.run.speedup, 1))]
+         round((history.run.last - history.run.first) * history.run.scale.speedup, 1))]
 
 
 def tables(history: FlightHistory) -> str:
@@ -200,7 +201,7 @@ def tables(history: FlightHistory) -> str:
                     for k, plan in enumerate(history.replans) if plan.changed or not k)),
         html_table('Gaps', ('UAV', 'from [s]', 'to [s]', 'for [s]'),
                    ((gap.uav or 'all', at(gap.since), at(gap.until),
-                     round((gap.until - gap.since) * history.run.speedup, 1))
+                     round((gap.until - gap.since) * history.run.scale.speedup, 1))
                     for gap in history.gaps)),
         html_table('Events', ('at [s]', 'event'),
                    ((at(wall), text) for wall, _, text in history.events)),
@@ -265,7 +266,7 @@ def _uav_row(history: FlightHistory, uav: str) -> tuple[Cell, ...]:
             None if battery is None else f'{100.0 * battery:.0f} %', state['mode'].lower(),
             _last_flown(history, [task for task, service in history.run.flown.items()
                                   if service.uav == uav]),
-            round(silent * history.run.speedup, 1),
+            round(silent * history.run.scale.speedup, 1),
             None if lost is None else round(history.clock(lost.wall), 1), _place(history, uav))
 
 

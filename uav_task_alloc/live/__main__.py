@@ -33,8 +33,8 @@ def play(out_dir: Path, until: float = math.inf) -> SnapshotStore:
 
     def store() -> None:
         snapshots.put(state.last,
-                      {'start': state.start(), 'speedup': state.speedup, 'rate': state.rate,
-                       'live': False},
+                      {'start': state.start(), 'speedup': state.scale.speedup,
+                       'rate': state.scale.rate, 'live': False},
                       *scene.updates(state.last))
 
     path = out_dir / RECORD_FILE

@@ -70,10 +70,10 @@ class Scene:
             self.dirty.add('times')
         elif kind == 'allocation':
             self.new_plans.append(line)
-        clocks = self.run.speedup, self.run.allocators.lead.seconds
+        clocks = self.run.scale.speedup, self.run.allocators.lead.seconds
         self.run.apply(line)
         # arrivals and windows are other times then
-        if (self.run.speedup, self.run.allocators.lead.seconds) != clocks:
+        if (self.run.scale.speedup, self.run.allocators.lead.seconds) != clocks:
             self.dirty |= {'times', *(
                 f'list {uav}' for uav, each in self.run.lists.newest.items() if each['tasks'])}
 
@@ -202,10 +202,10 @@ class Scene:
             now, ended: see `updates`.
         """
         run = self.run
-        since = None if ended else run.allocators.silent_since(now, run.stretch)
+        since = None if ended else run.allocators.silent_since(now, run.scale.second)
         return {'silent': since and round(since, 1),
-                'bridges': {} if ended else run.bridges.silent(now, run.stretch),
-                'warnings': run.bridges.other_warnings(run.uavs, now, run.stretch)}
+                'bridges': {} if ended else run.bridges.silent(now, run.scale.second),
+                'warnings': run.bridges.other_warnings(run.uavs, now, run.scale.second)}
 
     def orders(self) -> LogEntry:
         """Orders in force, [id, text]; and the plan that waits for an operator, None for none."""
@@ -223,7 +223,7 @@ class Scene:
 
         `waits`: points to where it waits for tasks.
         """
-        line, speedup = self.run.lists.newest[uav], self.run.speedup
+        line, speedup = self.run.lists.newest[uav], self.run.scale.speedup
         planned_at = self.run.planned_at(line)
         waits = [to_decimetres(point) for point in line.get('waits', ())]
         return {'revision': line['revision'], **({'waits': waits} if waits else {}), 'tasks': [

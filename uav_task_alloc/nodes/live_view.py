@@ -227,7 +227,7 @@ class LiveView(Node):
             self.subscribe_list(msg.uav_id)
         line = self.line(message_records.state_record(msg))
         last = self.state.uavs.get(msg.uav_id)
-        if last is None or line['wall'] - last['wall'] >= _PERIOD * self.state.stretch or any(
+        if last is None or line['wall'] - last['wall'] >= _PERIOD * self.state.scale.second or any(
                 line[key] != last[key] for key in _STATE_FIELDS):
             self.apply(line)
 
@@ -293,7 +293,8 @@ class LiveView(Node):
         if self.server:
             self.snapshots.put(wall, {'start': self.state.start(), 'live': True,
                                       'beat': self.snapshots.version,  # another each time
-                                      'speedup': self.state.speedup, 'rate': self.state.rate,
+                                      'speedup': self.state.scale.speedup,
+                                      'rate': self.state.scale.rate,
                                       'ended': ended, 'still': self.watch.still}, *updates)
 
     def clock(self) -> float:

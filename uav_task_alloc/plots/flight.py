@@ -32,7 +32,7 @@ def draw_flight(out_dir: str | Path, png: str | Path) -> None:
     figure = MapFigure((point for task in state.tasks.values()
                         for point in (task.position, *task.path)), len(state.tasks))
     for interval in state.zones:
-        late = interval.since > state.start() + _AT_START * state.stretch
+        late = interval.since > state.start() + _AT_START * state.scale.second
         note = f'from {state.clock(interval.since):.0f} s' if late else ''
         figure.zone(interval.zone, note, late)
     figure.fence_area(state.fence_area)
@@ -68,7 +68,7 @@ def _tasks(figure: MapFigure, state: RunState, truth: GroundTruth,
     for name, task in state.tasks.items():
         for outline in (task.path, *task.holes):
             figure.outline(outline, closed=task.work == 'AREA')
-        marker = 'o' if task.wall <= state.start() + _AT_START * state.stretch else 'D'
+        marker = 'o' if task.wall <= state.start() + _AT_START * state.scale.second else 'D'
         if reached[name]:
             fill = uav_colour(indices[reached[name][0].uav])
             figure.task(task.position, fill, name, marker)

@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The clocks of vehicles and of the allocator against that of the record."""
+"""The clock of the allocator against that of the record."""
 from __future__ import annotations
 
 from collections import deque
 
-# share by which a measured clock rate varies, and that of a real vehicle over a bad link
-RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
 MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
 _DELAYS = 10  # newest messages, of which the fastest compares the clocks
 
@@ -30,17 +28,3 @@ class ClockLead:
         lead = min(self._delays)
         if abs(lead - self.seconds) > second:
             self.seconds = lead if abs(lead) > second else 0.0
-
-
-def rounded_rate(rate: float) -> float:
-    """A measured clock rate; the whole number near it where there is one, as that was chosen.
-
-    Args:
-        rate: seconds of the vehicles in a second of wall time, with the jitter of their links.
-
-    Returns:
-        1.0 also for 10 % more or less.
-    """
-    whole = max(1.0, float(round(rate)))
-    tolerance = _REAL_TIME_TOLERANCE if whole == 1.0 else RATE_TOLERANCE * whole
-    return whole if abs(rate - whole) <= tolerance else round(rate, 2)

@@ -145,7 +145,7 @@ def read_run(out_dir: Path) -> tuple[RunState, GroundTruth]:
         OSError: a file cannot be read.
     """
     state = read_record(out_dir)
-    return state, read_truth(out_dir, state.simulated)
+    return state, read_truth(out_dir, state.scale.simulated)
 
 
 def visits(truth: GroundTruth, tasks: Mapping[str, Point], waited: Container[str] = (),

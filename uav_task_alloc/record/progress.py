@@ -72,7 +72,7 @@ def authority_text(run: RunState, uav: str, now: float) -> str:
         known = f'authority {name.lower()}' if name not in ('', 'UNKNOWN') else ''
         return ': '.join(filter(None, (known, reason)))
     age = '' if reported.since is None else (
-        f' for {run.speedup * max(0.0, now - reported.since):.0f} s')
+        f' for {run.scale.speedup * max(0.0, now - reported.since):.0f} s')
     text = f'authority {name.lower()}{age}: {reported.reason}'
     text += f'; given back by {reported.given_back_by}' if reported.given_back_by else ''
     return text if not reason or reported.reason in reason else f'{text}; not available: {reason}'

@@ -5,18 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from statistics import median
 
 from uav_task_alloc.geometry.fence_area import AreaCorners
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record.allocator_reports import ALLOCATOR_SILENT, AllocatorReports
 from uav_task_alloc.record.bridge_reports import BridgeReports
-from uav_task_alloc.record.clock_comparison import (
-    MAX_STAMP_AGE,
-    RATE_TOLERANCE,
-    rounded_rate,
-)
+from uav_task_alloc.record.clock_comparison import MAX_STAMP_AGE
 from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lists
 from uav_task_alloc.record.record_file import RECORD_FILE, Line, read_lines
 from uav_task_alloc.record.reported import (
@@ -31,6 +26,7 @@ from uav_task_alloc.record.reported import (
 )
 from uav_task_alloc.record.reported_lists import ReportedLists
 from uav_task_alloc.record.task_statuses import TaskStatuses
+from uav_task_alloc.record.time_scale import TimeScale
 from uav_task_alloc.zone_codec import decode_zone
 
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
@@ -67,13 +63,9 @@ class RunState:
     proposal: Line | None = None  # the last plan that waited for an operator
     alerts: dict[tuple[str, ...], Line] = field(default_factory=dict)  # in force, by pair
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
-    speedup: float = 1.0  # scenario seconds in a second of `wall`; 1 where that is /clock
-    rate: float = 1.0  # scenario seconds in a second of real time
-    simulated: bool = False  # `wall` is the time of /clock
+    scale: TimeScale = field(default_factory=TimeScale)  # of its clocks
     origin: Origin | None = None  # of the ENU frame; None: not known yet
     fence_area: AreaCorners = ()  # [m]; (): none
-    measured: bool = True  # `rate` is that of the vehicles' clocks, as no one stated it
-    clock_rates: dict[str, float] = field(default_factory=dict)  # of the vehicles, by UAV
     begun: float = math.inf  # [unix s] of the first announced task
     first: float = math.inf  # [unix s] of the first line
     last: float = -math.inf  # [unix s] of the last line
@@ -85,21 +77,12 @@ class RunState:
 
     def on_run(self, line: Line) -> None:
         """Parameters of the run; a speedup of 0 is to be measured."""
-        self.measured, self.simulated = not line['speedup'], bool(line.get('simulated'))
-        self._set_rate(line['speedup'] or self.rate)
-
-    def _set_rate(self, rate: float) -> None:
-        self.rate, self.speedup = rate, 1.0 if self.simulated else rate
+        self.scale.state(line['speedup'], bool(line.get('simulated')))
 
     @property
     def silent_after(self) -> float:
         """Seconds of `wall` without a state after which a UAV is silent."""
-        return SILENT_AFTER * self.stretch
-
-    @property
-    def stretch(self) -> float:
-        """Seconds of `wall` in a second of real time."""
-        return self.rate if self.simulated else 1.0
+        return SILENT_AFTER * self.scale.second
 
     def on_origin(self, line: Line) -> None:
         """The origin of the ENU frame, as a node of the fleet published it."""
@@ -160,7 +143,7 @@ class RunState:
                 self.flown.pop(row['task'], None)  # forgotten, and announced again
             elif row['task'] not in self.flown and not self.ended_before(row, line):
                 task = self.tasks.get(row['task'])
-                service = task.service / self.speedup if task else 0.0
+                service = task.service / self.scale.speedup if task else 0.0
                 self.flown[row['task']] = Service(row['uav'], line['wall'] - service, line['wall'])
         self.statuses.apply(line)
 
@@ -223,7 +206,7 @@ class RunState:
         """
         if 'finish' not in row:
             return None
-        begin, end = (self.planned_at(line) + t / self.speedup
+        begin, end = (self.planned_at(line) + t / self.scale.speedup
                       for t in (row['eta'] + row['wait'], row['finish']))
         return Service(line['uav'], begin, end)
 
@@ -231,7 +214,7 @@ class RunState:
         """When a list was planned [unix s]; on arrival where its stamp is of another clock."""
         wall, stamp = line['wall'], line.get('stamp', 0.0) + self.allocators.lead.seconds
         # two nodes read /clock up to a tick apart
-        return stamp if -self.stretch <= wall - stamp < MAX_STAMP_AGE else float(wall)
+        return stamp if -self.scale.second <= wall - stamp < MAX_STAMP_AGE else float(wall)
 
     def on_state(self, line: Line) -> None:
         """The state of one UAV."""
@@ -241,32 +224,28 @@ class RunState:
 
     def on_uploads(self, line: Line) -> None:
         """Diagnostics of the bridge: uploads, health, authority and clocks of its UAVs."""
-        self.bridges.apply(line, self.stretch)
-        self.allocators.apply(line, self.stretch)
-        self.clock_rates.update(line.get('clock_rates', {}))
-        if self.measured and self.clock_rates:
-            rate = median(self.clock_rates.values())
-            if abs(rate - self.rate) > RATE_TOLERANCE * self.rate:
-                self._set_rate(rounded_rate(rate))
+        self.bridges.apply(line, self.scale.second)
+        self.allocators.apply(line, self.scale.second)
+        self.scale.measure(line.get('clock_rates', {}))
         for uav, row in line.get('authority', {}).items():
-            since = None if row['for'] is None else line['wall'] - self.stretch * row['for']
+            since = None if row['for'] is None else line['wall'] - self.scale.second * row['for']
             old = self.authority.get(uav)
             if (old and since is not None and old.since is not None and old.state == row['state']
-                    and abs(since - old.since) < SINCE_TOLERANCE * self.stretch):
+                    and abs(since - old.since) < SINCE_TOLERANCE * self.scale.second):
                 since = old.since
             self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
 
     def forget_silent(self, wall: float) -> bool:
         """Forget orders and warnings of allocators that have ended; whether there were any."""
-        return self.allocators.forget_silent(wall, self.stretch)
+        return self.allocators.forget_silent(wall, self.scale.second)
 
     def waiting_plan(self, wall: float) -> Line | None:
         """The plan that waits; None after its deadline, or where its allocator has ended."""
         plan = self.proposal
-        if plan is None or not plan['open'] or self.allocators.have_ended(wall, self.stretch):
+        if plan is None or not plan['open'] or self.allocators.have_ended(wall, self.scale.second):
             return None
         overdue = wall - plan['deadline'] - self.allocators.lead.seconds
-        return None if overdue > ALLOCATOR_SILENT * self.stretch else plan
+        return None if overdue > ALLOCATOR_SILENT * self.scale.second else plan
 
     def is_low(self, battery: float | None) -> bool:
         """Whether a battery is below the reserve of an allocator.
@@ -295,7 +274,7 @@ class RunState:
 
     def clock(self, wall: float) -> float:
         """Scenario time [s] at a wall time."""
-        return (wall - self.start()) * self.speedup
+        return (wall - self.start()) * self.scale.speedup
 
     def zones_now(self) -> list[ThreatZone]:
         """The zones in force after the last line."""
