@@ -188,7 +188,7 @@ class Scene:
 
         `reason`: why the UAV is not available.
         """
-        name, reported = state.get('authority', ''), self.run.authority.get(uav)
+        name, reported = state.get('authority', ''), self.run.bridges.authority.get(uav)
         known = {'state': name, 'reason': state.get('reason', '')}
         if reported is None or reported.state != name:  # the diagnostics arrive later
             return {**known, 'why': '', 'since': None, 'back': ''}

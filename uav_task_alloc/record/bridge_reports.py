@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What nodes report on `/diagnostics`: health of UAVs and of themselves, counts of uploads."""
+"""What nodes report on `/diagnostics`: health, counts of uploads, authority over UAVs."""
 from __future__ import annotations
 
 from collections.abc import Container
 
 from uav_task_alloc.record.record_file import Line
+from uav_task_alloc.record.reported import ReportedAuthority
 
 _MOST = 100  # warnings
+_SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 _OUT_OF_DATE = 10.0  # [s] of real time that a report is older than another of its UAV
 
 
@@ -20,6 +22,7 @@ class BridgeReports:
     """
 
     def __init__(self) -> None:
+        self.authority: dict[str, ReportedAuthority] = {}  # by UAV
         self._counts: dict[str, tuple[int, int]] = {}  # by status: newest, of earlier runs
         self._last: dict[str, float] = {}  # by bridge: [unix s] of its newest report on a UAV
         # by UAV or other hardware id, then status: [unix s], level, text
@@ -39,6 +42,18 @@ class BridgeReports:
             known = {other: row for other, row in self._health.get(uav, {}).items()
                      if line['wall'] - row[0] <= _OUT_OF_DATE * second}
             self._health[uav] = {**known, name: (line['wall'], level, text)}
+        for uav, row in line.get('authority', {}).items():
+            self.authority[uav] = ReportedAuthority(
+                row['state'], row['why'], self._since(uav, row, line['wall'], second), row['back'])
+
+    def _since(self, uav: str, row: Line, wall: float, second: float) -> float | None:
+        """Since when authority is as a report says [unix s]; the same while it stays so."""
+        if row['for'] is None:
+            return None
+        since, old = float(wall - second * row['for']), self.authority.get(uav)
+        if old is None or old.since is None or old.state != row['state']:
+            return since
+        return old.since if abs(since - old.since) < _SINCE_TOLERANCE * second else since
 
     def warnings(self, uav: str) -> list[str]:
         """Return what is wrong with a UAV, the worst first.

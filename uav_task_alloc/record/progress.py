@@ -66,7 +66,7 @@ def authority_text(run: RunState, uav: str, now: float) -> str:
 
     As all times of the display, the duration is in seconds of the scenario.
     """
-    state, reported = run.uavs[uav], run.authority.get(uav)
+    state, reported = run.uavs[uav], run.bridges.authority.get(uav)
     name, reason = state.get('authority', ''), state.get('reason', '')
     if reported is None or reported.state != name:
         known = f'authority {name.lower()}' if name not in ('', 'UNKNOWN') else ''

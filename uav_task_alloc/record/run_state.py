@@ -17,7 +17,6 @@ from uav_task_alloc.record.record_file import RECORD_FILE, Line, read_lines
 from uav_task_alloc.record.reported import (
     END_STATES,
     AnnouncedTask,
-    ReportedAuthority,
     Service,
     SolveRecord,
     ZoneInterval,
@@ -29,7 +28,6 @@ from uav_task_alloc.record.task_statuses import TaskStatuses
 from uav_task_alloc.record.time_scale import TimeScale
 from uav_task_alloc.zone_codec import decode_zone
 
-SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
 
 
@@ -62,7 +60,6 @@ class RunState:
     allocators: AllocatorReports = field(default_factory=AllocatorReports)
     proposal: Line | None = None  # the last plan that waited for an operator
     alerts: dict[tuple[str, ...], Line] = field(default_factory=dict)  # in force, by pair
-    authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
     scale: TimeScale = field(default_factory=TimeScale)  # of its clocks
     origin: Origin | None = None  # of the ENU frame; None: not known yet
     fence_area: AreaCorners = ()  # [m]; (): none
@@ -224,16 +221,9 @@ class RunState:
 
     def on_uploads(self, line: Line) -> None:
         """Diagnostics of the bridge: uploads, health, authority and clocks of its UAVs."""
+        self.scale.measure(line.get('clock_rates', {}))
         self.bridges.apply(line, self.scale.second)
         self.allocators.apply(line, self.scale.second)
-        self.scale.measure(line.get('clock_rates', {}))
-        for uav, row in line.get('authority', {}).items():
-            since = None if row['for'] is None else line['wall'] - self.scale.second * row['for']
-            old = self.authority.get(uav)
-            if (old and since is not None and old.since is not None and old.state == row['state']
-                    and abs(since - old.since) < SINCE_TOLERANCE * self.scale.second):
-                since = old.since
-            self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
 
     def forget_silent(self, wall: float) -> bool:
         """Forget orders and warnings of allocators that have ended; whether there were any."""
