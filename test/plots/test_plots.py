@@ -190,6 +190,24 @@ def test_a_flight_with_a_late_zone_a_late_task_and_a_lost_uav_is_drawn(tmp_path)
     assert (tmp_path / 'map.png').read_bytes().startswith(PNG)
 
 
+def test_tasks_that_the_allocator_has_forgotten_count_for_the_uav_that_flew_them(
+        tmp_path, monkeypatch):
+    row = {'task': 'a', 'state': 'COMPLETED', 'uav': 'u1', 'reason': ''}
+    write(tmp_path / RECORD_FILE,
+          {'wall': 1.0, 'kind': 'announcement', 'action': 'ADD',
+           'tasks': [{'id': 'a', 'position': [50.0, 90.0, 40.0]}]},
+          {'wall': 2.0, 'kind': 'statuses', 'statuses': [row]},
+          {'wall': 3.0, 'kind': 'statuses', 'statuses': []})
+    write(tmp_path / TRUTH_FILE, {'t': 0.0, 'wall': 0.0, 'uav': 'u1', 'x': 0.0, 'y': 0.0,
+                                  'z': 40.0, 'alive': True})
+    texts = []
+    monkeypatch.setattr(MapFigure, 'finish', lambda _, title, handles, png: texts.extend(
+        [title, *(handle.get_label() for handle in handles)]))
+    plots.draw_flight(tmp_path, tmp_path / 'map.png')
+    assert texts[0].startswith('1 of 1 tasks completed')
+    assert texts[1].startswith('u1: 1 task, ')
+
+
 def test_an_empty_record_is_drawn(tmp_path):
     write(tmp_path / RECORD_FILE)
     write(tmp_path / TRUTH_FILE)

@@ -50,7 +50,7 @@ def _tracks(figure: MapFigure, state: RunState, truth: GroundTruth,
         figure.route(points, index)
         figure.home(points[0], uav, index)
         done = sum(status.state == 'COMPLETED' and status.uav == uav and not status.pieces
-                   for status in (*state.statuses.tasks.values(),
+                   for status in (*state.statuses.known().values(),
                                   *state.statuses.known_pieces().values()))
         text = f'{uav}: {style.task_count(done)}, {polyline_length(points) / 1e3:.1f} km'
         handles.append(style.route_handle(index, text))
