@@ -197,6 +197,8 @@ def test_the_report_says_which_seconds_are_those_of_the_mission():
     assert [(shape['x0'], shape['x1']) for shape in layout['shapes']] == [(-60.0, 0.0),
                                                                           (80.0, 110.0)]
     assert 'when the recording ended with open tasks' in report_page(read_history(begin), 'x')
+    forgotten = read_history([*begin, *end, statuses(50.0)])
+    assert said in report_page(forgotten, 'x')
 
 
 def test_a_plan_that_changed_nothing_is_no_replan():

@@ -45,7 +45,6 @@ def test_pieces_are_no_tasks():
     assert states(statuses.known()) == {'f': 'ASSIGNED'}
     assert states(statuses.known_pieces()) == {'f#1': 'COMPLETED', 'f#2': 'ASSIGNED'}
     assert statuses.in_newest('f#1').state == 'COMPLETED'
-    assert statuses.present() == {'f', 'f#1', 'f#2'}
     assert statuses.count('ASSIGNED', 'COMPLETED') == 1
     assert statuses.completed() == {'f#1'}
 
@@ -53,7 +52,7 @@ def test_pieces_are_no_tasks():
 def test_of_forgotten_pieces_the_flown_ones_are_known():
     statuses = after({'f#1': 'COMPLETED', 'f#2': 'CANCELLED'}, {}, {})
     assert states(statuses.known_pieces()) == {'f#1': 'COMPLETED'}
-    assert (statuses.present(), statuses.completed()) == (set(), set())
+    assert statuses.completed() == set()
 
 
 def test_a_new_task_of_a_forgotten_id_has_neither_its_end_nor_its_pieces():

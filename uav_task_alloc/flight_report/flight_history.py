@@ -254,8 +254,9 @@ class FlightHistory:
 
     def mission_end(self) -> float:
         """When the last task ended [unix s]; the end of the recording while tasks are open."""
-        present = self.run.statuses.present()  # not those cut again
-        ends = [spans[-1] for name, spans in self.spans.items() if name in present]
+        statuses = self.run.statuses
+        known = statuses.known().keys() | statuses.known_pieces().keys()  # not those cut again
+        ends = [spans[-1] for name, spans in self.spans.items() if name in known]
         if not ends or any(span.state in _OPEN_STATES for span in ends):
             return self.run.last
         return max((span.since for span in ends if span.state in END_STATES),

@@ -78,10 +78,6 @@ class TaskStatuses:
         """The last status of each piece, also of flown ones that the allocator has forgotten."""
         return {**self._flown_pieces, **self._pieces}
 
-    def present(self) -> set[str]:
-        """Ids of the tasks and pieces in the newest message."""
-        return self.tasks.keys() | self._pieces.keys()
-
     def count(self, *states: str) -> int:
         """Number of tasks in one of these states."""
         return sum(status.state in states for status in self.known().values())
