@@ -2,8 +2,6 @@
 """Shows a fleet in the terminal and in the browser, records it, and ends with its scenario."""
 from __future__ import annotations
 
-import select
-import shutil
 import sys
 from collections import deque
 from collections.abc import Callable
@@ -36,11 +34,12 @@ from uav_task_alloc.nodes.ros.clock_watch import (
 )
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run, with_flags
+from uav_task_alloc.nodes.ros.terminal_status import TerminalStatus
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import LiveViewParams
 from uav_task_alloc.record import diagnostic_records, message_records
 from uav_task_alloc.record.message_records import RecordBody
-from uav_task_alloc.record.progress import fleet_lines, headline, run_is_over
+from uav_task_alloc.record.progress import run_is_over
 from uav_task_alloc.record.record_file import RecordWriter
 from uav_task_alloc.record.run_state import RunState
 
@@ -51,44 +50,10 @@ if TYPE_CHECKING:
 _Message = TypeVar('_Message')
 _BEGIN_PERIOD = 0.05  # [s] between two checks whether there is a time
 _PERIOD = 0.5  # [s] between updates of terminal and page
-_PLAIN_PERIODS = 4  # between two lines where the output is no terminal
 _TASKS = 'task_announcements'  # topic
 _MOST_REFUSALS = 200  # lines of the log
-_UP_AND_CLEAR = '\x1b[{}F\x1b[J'
 _STATE_FIELDS = ('mode', 'mission_state', 'active', 'list_revision', 'available', 'authority',
                  'reason', 'fence')  # a change of one is recorded at once
-
-
-class TerminalStatus:
-    """The state of a run on stdout; a terminal is rewritten, a file gets a line at times."""
-
-    def __init__(self) -> None:
-        self._lines = 0  # printed last
-        self._updates = 0
-
-    def update(self, state: RunState, wall: float, clock: float, last: bool) -> None:
-        """Print the state at `wall` [unix s], `clock` [s] of the scenario; `last`: in any case."""
-        self._updates += 1
-        if not last and not _takes_text():
-            return
-        lines = [headline(state, clock)]
-        if sys.stdout.isatty():
-            lines += fleet_lines(state, wall)
-            width = shutil.get_terminal_size().columns - 1  # a wrapped line cannot be rewritten
-            lines = [line[:width] for line in lines]
-            sys.stdout.write(_UP_AND_CLEAR.format(self._lines) if self._lines else '')
-            self._lines = len(lines)
-        elif self._updates % _PLAIN_PERIODS and not last:
-            return
-        print('\n'.join(map(printable, lines)), flush=True)
-
-
-def _takes_text() -> bool:
-    """Whether stdout takes text at once: a stopped terminal (Ctrl-S) would stop the node."""
-    try:
-        return bool(select.select([], [sys.stdout], [], 0.0)[1])
-    except (OSError, ValueError):  # it is no file, or closed
-        return True
 
 
 class LiveView(Node):

@@ -6,7 +6,7 @@ from threading import Thread
 
 import pytest
 
-from uav_task_alloc.nodes import live_view
+from uav_task_alloc.nodes.ros import terminal_status
 from uav_task_alloc.record import run_state
 
 pytestmark = pytest.mark.ros
@@ -19,12 +19,12 @@ def test_a_pipe_that_nobody_reads_does_not_stop_the_node(monkeypatch):
         while True:
             os.write(begin, bytes(4096))
     os.set_blocking(begin, True)
-    status, run = live_view.TerminalStatus(), run_state.RunState()
+    status, run = terminal_status.TerminalStatus(), run_state.RunState()
     with os.fdopen(begin, 'w') as out:
-        monkeypatch.setattr(live_view.sys, 'stdout', out)
+        monkeypatch.setattr(terminal_status.sys, 'stdout', out)
 
         def update():
-            for _ in range(2 * live_view._PLAIN_PERIODS):
+            for _ in range(2 * terminal_status._PLAIN_PERIODS):
                 status.update(run, 0.0, 0.0, False)
         printing = Thread(target=update, daemon=True)
         printing.start()
