@@ -351,7 +351,7 @@ def test_an_update_that_fails_is_logged_and_ends_nothing():
     view = SimpleNamespace(
         clock=lambda: 0.0, now=lambda: 0.0, is_finished=lambda _: False, state=None,
         terminal=SimpleNamespace(update=fail), update_page=lambda: done.append('page'),
-        _to_record=lambda _: done.append('record'),
+        record=SimpleNamespace(flush=lambda: done.append('record')),
         log_refusal=lambda what, error: done.append(f'{what}: {error}'))
     view._guard = lambda what, update: LiveView._guard(view, what, update)
     LiveView.on_timer(view)

@@ -40,7 +40,7 @@ from uav_task_alloc.params import LiveViewParams
 from uav_task_alloc.record import diagnostic_records, message_records
 from uav_task_alloc.record.message_records import RecordBody
 from uav_task_alloc.record.progress import run_is_over
-from uav_task_alloc.record.record_file import RecordWriter
+from uav_task_alloc.record.run_record import RunRecord
 from uav_task_alloc.record.run_state import RunState
 
 if TYPE_CHECKING:
@@ -80,7 +80,8 @@ class LiveView(Node):
         self.logged_refusals: set[tuple[str, str]] = set()  # topic and reason
         self.scene, self.snapshots = Scene(self.state), SnapshotStore()
         self.terminal = TerminalStatus()
-        self.record = self._open_record()
+        self.record = RunRecord(self.params.out_dir, self.get_logger().warning,
+                                self.get_logger().error)
         self.recorder = self._start_recorder()
         self.finished = False
         self.over_since: float | None = None  # [s] of the scenario
@@ -220,18 +221,7 @@ class LiveView(Node):
     def apply(self, line: RecordBody) -> None:
         """Apply a line to the state of the run, and write it to the record."""
         self.scene.apply(line)
-        self._to_record(lambda record: record.write(line))
-
-    def _to_record(self, write: Callable[[RecordWriter], None]) -> None:
-        """Write to the record, if there is one; it ends where that fails, and the node goes on."""
-        if self.record is None:
-            return
-        try:
-            write(self.record)
-        except OSError as error:
-            self.get_logger().error(f'out_dir: {error}: the record ends, the node goes on')
-            self.record.close()
-            self.record = None
+        self.record.write(line)
 
     def on_timer(self) -> None:
         """Update terminal and page, and finish some time after the scenario is over."""
@@ -240,7 +230,7 @@ class LiveView(Node):
         self._guard('terminal', lambda: self.terminal.update(
             self.state, self.now(), clock, self.finished))
         self._guard('page', self.update_page)
-        self._to_record(RecordWriter.flush)
+        self.record.flush()
 
     def is_finished(self, clock: float) -> bool:
         """Whether the scenario has been over for the parameter `settle` [s]."""
@@ -265,18 +255,6 @@ class LiveView(Node):
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""
         return self.state.clock(self.now()) if self.state.tasks else 0.0
-
-    def _open_record(self) -> RecordWriter | None:
-        if not self.params.out_dir:
-            return None
-        try:
-            record = RecordWriter(Path(self.params.out_dir))
-            if record.earlier:
-                self.get_logger().warning(f'out_dir: its record was moved to {record.earlier}')
-            return record
-        except OSError as error:
-            raise InvalidValue('out_dir', self.params.out_dir,
-                               f'a folder that can be written to ({error})') from None
 
     def _start_server(self) -> PageServer | None:
         """Serve the page; None, with the reason in the log, where that is not possible."""
@@ -328,9 +306,7 @@ class LiveView(Node):
             self.server.stop()
         if self.recorder:
             self.recorder.stop()
-        if self.record:
-            self.record.close()
-            self.record = None
+        self.record.close()
         super().destroy_node()
 
 
