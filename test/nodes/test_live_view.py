@@ -23,6 +23,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     from_zones,
 )
 from uav_task_alloc.nodes.live_view import LiveView
+from uav_task_alloc.nodes.ros.message_guard import MessageGuard
 from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.record import diagnostic_records, message_records, run_state
 from uav_task_alloc.record.record_file import read_lines
@@ -352,10 +353,9 @@ def test_an_update_that_fails_is_logged_and_ends_nothing():
         clock=lambda: 0.0, now=lambda: 0.0, is_finished=lambda _: False, state=None,
         terminal=SimpleNamespace(update=fail), update_page=lambda: done.append('page'),
         record=SimpleNamespace(flush=lambda: done.append('record')),
-        log_refusal=lambda what, error: done.append(f'{what}: {error}'))
-    view._guard = lambda what, update: LiveView._guard(view, what, update)
+        guard=MessageGuard(done.append))
     LiveView.on_timer(view)
-    assert done == ['terminal: why', 'page', 'record']
+    assert done == ['terminal: ValueError: why: ignored; logged once', 'page', 'record']
 
 
 def test_a_full_disk_ends_the_record_and_not_the_view(start, probe, tmp_path):

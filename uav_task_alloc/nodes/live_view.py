@@ -23,7 +23,6 @@ from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
 from uav_task_alloc.live.tiles import tile_source
 from uav_task_alloc.nodes.conversions.announcements import is_in_wgs84, valid_tasks
-from uav_task_alloc.nodes.conversions.message_limits import cut, printable
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.clock_watch import (
     SteadyTime,
@@ -32,6 +31,7 @@ from uav_task_alloc.nodes.ros.clock_watch import (
     steady_clock,
     watch_clock,
 )
+from uav_task_alloc.nodes.ros.message_guard import MessageGuard
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run, with_flags
 from uav_task_alloc.nodes.ros.terminal_status import TerminalStatus
@@ -51,7 +51,6 @@ _Message = TypeVar('_Message')
 _BEGIN_PERIOD = 0.05  # [s] between two checks whether there is a time
 _PERIOD = 0.5  # [s] between updates of terminal and page
 _TASKS = 'task_announcements'  # topic
-_MOST_REFUSALS = 200  # lines of the log
 _STATE_FIELDS = ('mode', 'mission_state', 'active', 'list_revision', 'available', 'authority',
                  'reason', 'fence')  # a change of one is recorded at once
 
@@ -77,7 +76,7 @@ class LiveView(Node):
         self.state = RunState()
         self.with_lists: set[str] = set()  # UAVs to whose task lists it subscribes
         self.held: deque[m.TaskAnnouncement] = deque()  # until the origin is known
-        self.logged_refusals: set[tuple[str, str]] = set()  # topic and reason
+        self.guard = MessageGuard(self.get_logger().warning)
         self.scene, self.snapshots = Scene(self.state), SnapshotStore()
         self.terminal = TerminalStatus()
         self.record = RunRecord(self.params.out_dir, self.get_logger().warning,
@@ -131,7 +130,7 @@ class LiveView(Node):
                    to_record: Callable[[_Message], RecordBody]) -> None:
         """Record every message of a topic as `to_record` converts it."""
         def on_message(msg: _Message) -> None:
-            self._guard(topic, lambda: self.apply(self.line(to_record(msg))))
+            self.guard.handle(topic, lambda: self.apply(self.line(to_record(msg))))
         self.create_subscription(msg_type, topic, on_message, qos)
 
     def subscribe_list(self, uav_id: str) -> None:
@@ -140,7 +139,7 @@ class LiveView(Node):
         try:
             topic = check_topic(self, TASK_LIST, uav_id)
         except InvalidValue as error:  # its state is shown nevertheless
-            return self.log_refusal('task_list', error)
+            return self.guard.refuse('task_list', error)
         self._subscribe(m.TaskList, topic, LATCHED, message_records.task_list_record)
 
     def on_announcement(self, msg: m.TaskAnnouncement) -> None:
@@ -149,9 +148,9 @@ class LiveView(Node):
         What is announced after one that is held is held, too: the order counts.
         """
         if self.state.origin is None and (self.held or is_in_wgs84(msg)):
-            self._guard(_TASKS, lambda: self.hold(msg))
+            self.guard.handle(_TASKS, lambda: self.hold(msg))
         else:
-            self._guard(_TASKS, lambda: self.apply_announcement(msg))
+            self.guard.handle(_TASKS, lambda: self.apply_announcement(msg))
 
     def hold(self, msg: m.TaskAnnouncement) -> None:
         """Hold an announcement, up to as many as the topic keeps."""
@@ -169,7 +168,7 @@ class LiveView(Node):
 
     def on_origin(self, msg: m.FleetOrigin) -> None:
         """Record the origin, then the announcements that waited for it."""
-        self._guard('fleet_origin', lambda: self.apply(
+        self.guard.handle('fleet_origin', lambda: self.apply(
             self.line(message_records.origin_record(msg))))
         while self.held and self.state.origin is not None:
             self.on_announcement(self.held.popleft())
@@ -178,12 +177,12 @@ class LiveView(Node):
         """Record what the nodes of this fleet report of themselves."""
         msg.status = diagnostic_records.of_namespace(msg, self.get_namespace())
         if msg.status:
-            self._guard('/diagnostics', lambda: self.apply(
+            self.guard.handle('/diagnostics', lambda: self.apply(
                 self.line(diagnostic_records.uploads_record(msg))))
 
     def on_state(self, msg: m.UavState) -> None:
         """Record the state of a UAV."""
-        self._guard('uav_states', lambda: self.apply_state(msg))
+        self.guard.handle('uav_states', lambda: self.apply_state(msg))
 
     def apply_state(self, msg: m.UavState) -> None:
         """Record a state that differs in more than its position at once, others twice a second."""
@@ -196,22 +195,6 @@ class LiveView(Node):
         if last is None or line['wall'] - last['wall'] >= _PERIOD * self.state.scale.second or any(
                 line[key] != last[key] for key in _STATE_FIELDS):
             self.apply(line)
-
-    def _guard(self, topic: str, handle: Callable[[], None]) -> None:
-        """Handle a message; whatever it raises is logged as its refusal."""
-        try:
-            handle()
-        except Exception as error:
-            self.log_refusal(topic, error)
-
-    def log_refusal(self, topic: str, error: Exception) -> None:
-        """Log why a message is refused, each reason of a topic once."""
-        reason = printable(str(error)) if isinstance(error, InvalidValue) else cut(
-            f'{type(error).__name__}: {error}')
-        refusal = topic, reason
-        if len(self.logged_refusals) < _MOST_REFUSALS and refusal not in self.logged_refusals:
-            self.logged_refusals.add(refusal)
-            self.get_logger().warning(f'{topic}: {reason}: ignored; logged once')
 
     def line(self, body: RecordBody) -> RecordBody:
         """The line of a message that arrives now, with all its times in that of the record."""
@@ -227,9 +210,9 @@ class LiveView(Node):
         """Update terminal and page, and finish some time after the scenario is over."""
         clock = self.clock()
         self.finished = self.is_finished(clock)
-        self._guard('terminal', lambda: self.terminal.update(
+        self.guard.handle('terminal', lambda: self.terminal.update(
             self.state, self.now(), clock, self.finished))
-        self._guard('page', self.update_page)
+        self.guard.handle('page', self.update_page)
         self.record.flush()
 
     def is_finished(self, clock: float) -> bool:
