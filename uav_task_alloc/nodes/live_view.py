@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -22,7 +21,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
 from uav_task_alloc.live.tiles import tile_source
-from uav_task_alloc.nodes.conversions.announcements import is_in_wgs84, valid_tasks
+from uav_task_alloc.nodes.conversions.announcements import valid_tasks
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.clock_watch import (
     SteadyTime,
@@ -31,6 +30,7 @@ from uav_task_alloc.nodes.ros.clock_watch import (
     steady_clock,
     watch_clock,
 )
+from uav_task_alloc.nodes.ros.held_announcements import HeldAnnouncements
 from uav_task_alloc.nodes.ros.message_guard import MessageGuard
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run, with_flags
@@ -75,7 +75,7 @@ class LiveView(Node):
         self.played = scenario.load(self.params.scenario) if self.params.scenario else None
         self.state = RunState()
         self.with_lists: set[str] = set()  # UAVs to whose task lists it subscribes
-        self.held: deque[m.TaskAnnouncement] = deque()  # until the origin is known
+        self.held = HeldAnnouncements(self.get_logger().info)
         self.guard = MessageGuard(self.get_logger().warning)
         self.scene, self.snapshots = Scene(self.state), SnapshotStore()
         self.terminal = TerminalStatus()
@@ -143,22 +143,11 @@ class LiveView(Node):
         self._subscribe(m.TaskList, topic, LATCHED, message_records.task_list_record)
 
     def on_announcement(self, msg: m.TaskAnnouncement) -> None:
-        """Record an announcement, and first hold one in WGS84 until the origin is known.
-
-        What is announced after one that is held is held, too: the order counts.
-        """
-        if self.state.origin is None and (self.held or is_in_wgs84(msg)):
-            self.guard.handle(_TASKS, lambda: self.hold(msg))
-        else:
-            self.guard.handle(_TASKS, lambda: self.apply_announcement(msg))
-
-    def hold(self, msg: m.TaskAnnouncement) -> None:
-        """Hold an announcement, up to as many as the topic keeps."""
-        if len(self.held) >= ANNOUNCEMENTS.depth:
-            raise InvalidValue('fleet_origin', 'unknown', 'an origin for tasks in WGS84')
-        if not self.held:
-            self.get_logger().info('tasks in WGS84, and later ones, wait for fleet_origin')
-        self.held.append(msg)
+        """Record an announcement, or hold it until the origin is known."""
+        def take() -> None:
+            if self.state.origin is not None or not self.held.holds(msg):
+                self.apply_announcement(msg)
+        self.guard.handle(_TASKS, take)
 
     def apply_announcement(self, msg: m.TaskAnnouncement) -> None:
         """Record what is valid of an announcement; the allocator reports the rest."""
@@ -170,8 +159,9 @@ class LiveView(Node):
         """Record the origin, then the announcements that waited for it."""
         self.guard.handle('fleet_origin', lambda: self.apply(
             self.line(message_records.origin_record(msg))))
-        while self.held and self.state.origin is not None:
-            self.on_announcement(self.held.popleft())
+        if self.state.origin is not None:
+            for each in self.held.release():
+                self.on_announcement(each)
 
     def on_fleet_diagnostics(self, msg: DiagnosticArray) -> None:
         """Record what the nodes of this fleet report of themselves."""
