@@ -38,6 +38,7 @@ LEVELS = {
     'params': 1,
     'parameter_texts': 2,
     'journal': 1,
+    'journal_recovery': 2,
     'kernel_arguments': 0,
     'kernel_cache': 1,
     'kernel': 1,

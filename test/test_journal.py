@@ -15,8 +15,6 @@ from uav_task_alloc.journal import (
     Journal,
     JournalRow,
     _primary_code,
-    recover_rows,
-    set_aside,
 )
 
 WRITER = """
@@ -196,49 +194,6 @@ def test_finding_23_locked_in_the_path_is_not_a_foreign_lock(tmp_path):
     with pytest.raises(JournalError, match='cannot be opened') as caught:
         Journal(str(tmp_path / 'locked' / 'state'))
     assert not isinstance(caught.value, JournalForeign)
-
-
-@pytest.mark.parametrize('pages', [2, 4, 6])
-def test_finding_23_the_rows_before_a_truncation_are_recovered(tmp_path, pages):
-    journal = Journal(str(tmp_path))
-    journal.put([JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)])
-    journal.close()
-    file = tmp_path / FILE_NAME
-    file.write_bytes(file.read_bytes()[:4096 * pages])
-    with pytest.raises(JournalCorrupt, match='malformed'):
-        Journal(str(tmp_path))
-    held = file.read_bytes()
-    aside = set_aside(str(tmp_path))
-    recovered = recover_rows(aside)
-    assert aside.read_bytes() == held
-    assert {row.body for row in recovered} <= {'x' * 50}
-    assert len(recovered) >= 30 * (pages - 2)
-
-
-def test_finding_23_the_rows_on_both_sides_of_a_corrupt_page_are_recovered(tmp_path):
-    journal = Journal(str(tmp_path))
-    journal.put([JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)])
-    journal.close()
-    file = tmp_path / FILE_NAME
-    held = bytearray(file.read_bytes())
-    held[4 * 4096:5 * 4096] = bytes(range(256)) * 16
-    file.write_bytes(held)
-    recovered = {row.id for row in recover_rows(set_aside(str(tmp_path)))}
-    assert {'000', '299'} <= recovered
-    assert 200 <= len(recovered) < 300
-
-
-def test_a_damage_that_sqlite_quotes_in_its_error_is_a_damage(tmp_path):
-    journal = Journal(tmp_path)
-    journal.put([JournalRow('a', '1', 1)])
-    journal.close()
-    path = tmp_path / FILE_NAME
-    held = path.read_bytes()
-    at = held.index(b'CREATE TABLE world')
-    path.write_bytes(held[:at + 9] + b'\xac' + held[at + 10:])
-    with pytest.raises(JournalCorrupt, match=FILE_NAME):
-        Journal(tmp_path)
-    assert recover_rows(path) == []
 
 
 def test_rows_that_zeros_on_disk_hide_are_a_damage_not_an_empty_journal(tmp_path):

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import sqlite3
-import tempfile
-from collections.abc import Callable, Iterable
-from itertools import count
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from uav_task_alloc.atomic_files import sync_folder
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
 
 FILE_NAME = 'journal.sqlite3'
-_SUFFIXES = ('', '-wal', '-shm')
 VERSION = 1  # of the table layout; a file with a newer one is refused
 WAIT = 0.5  # [s] for the lock of another process
 _MIN_SIZE = 16  # [bytes] header of SQLite, which takes a shorter file for a new database
-_MAX_SIZE = 2**30  # [bytes] a corrupt header may declare any length
-_MEMORY = '/dev/shm'  # for a copy where no disk can be written to
 _COLUMNS = ['kind', 'id', 'body']
 # primary result codes of SQLite, and its texts for them: Python has the codes of errors
 # from 3.11 on
@@ -33,8 +28,6 @@ _TEXTS = {'database is locked': _BUSY, 'database table is locked': _LOCKED,
 # a text of SQLite that quotes a corrupt file may be no UTF-8
 _FAILURES = (sqlite3.Error, OSError, UnicodeDecodeError)
 _SELECT = 'SELECT kind, id, body FROM world'
-
-_Result = TypeVar('_Result')
 
 
 class JournalRow(NamedTuple):
@@ -234,136 +227,23 @@ def _body(text: Any) -> Any:
         return text if isinstance(text, bytes) else repr(text).encode()
 
 
-def set_aside(state_dir: str) -> Path:
-    """Rename the journal, so that a new one can be created.
+def readable_rows(path: Path) -> list[JournalRow]:
+    """Read a corrupt file from both ends up to the first error.
 
     Args:
-        state_dir: folder of the journal.
-
-    Returns:
-        The new name.
-
-    Raises:
-        JournalError: it cannot be renamed.
-    """
-    path = Path(state_dir).expanduser() / FILE_NAME
-    aside = next(name for k in count(1)
-                 if not (name := path.with_name(f'{FILE_NAME}.damaged-{k}')).exists())
-    try:
-        for suffix in _SUFFIXES:
-            if Path(f'{path}{suffix}').exists():
-                Path(f'{path}{suffix}').rename(f'{aside}{suffix}')
-    except OSError as error:
-        raise JournalError(f'{path} cannot be renamed: {error}') from error
-    return aside
-
-
-def read_copy(state_dir: str) -> list[JournalRow]:
-    """Read a journal that cannot be opened in its place, as on a read-only disk.
-
-    Args:
-        state_dir: folder of the journal.
-
-    Returns:
-        Its rows, from a temporary copy; none where there is no journal.
-
-    Raises:
-        JournalError: it cannot be copied or read.
-    """
-    path = Path(state_dir).expanduser() / FILE_NAME
-    if all(_is_missing(Path(f'{path}{suffix}')) for suffix in _SUFFIXES[:2]):
-        return []
-
-    def read(folder: str) -> list[JournalRow]:
-        journal = Journal(folder)
-        try:
-            return journal.load()
-        finally:
-            journal.close()
-
-    return _with_copy(path, read)
-
-
-def _is_missing(path: Path) -> bool:
-    try:
-        path.lstat()
-    except (FileNotFoundError, NotADirectoryError):
-        return True
-    except OSError:  # as where its folder may not be read
-        return False
-    return False
-
-
-def recover_rows(path: Path) -> list[JournalRow]:
-    """Read what is readable of a corrupt file, from both ends up to the first error.
-
-    Args:
-        path: the file, which is not changed.
+        path: the file; SQLite may write to it.
 
     Returns:
         Each readable row once.
-
-    Raises:
-        JournalError: it cannot be copied.
     """
     found: dict[tuple[str, str], JournalRow] = {}
-
-    def read(folder: str) -> None:
-        _pad(Path(folder, FILE_NAME))
-        db = _connect(Path(folder, FILE_NAME))
-        try:
-            for order in ('ASC', 'DESC'):
-                _read_on(db, f'{_SELECT} ORDER BY kind {order}, id {order}', found)
-        finally:
-            db.close()
-
-    _with_copy(path, read)
+    db = _connect(path)
+    try:
+        for order in ('ASC', 'DESC'):
+            with suppress(*_FAILURES):
+                for each in db.execute(f'{_SELECT} ORDER BY kind {order}, id {order}'):
+                    row = _row(*each)
+                    found.setdefault((row.kind, row.id), row)
+    finally:
+        db.close()
     return list(found.values())
-
-
-def _with_copy(path: Path, read: Callable[[str], _Result]) -> _Result:
-    """Call `read` with the folder of a temporary copy: on disk, else in memory.
-
-    Raises JournalError.
-    """
-    first_error: Exception | None = None
-    for parent in (None, _MEMORY):
-        try:
-            with tempfile.TemporaryDirectory(dir=parent) as folder:
-                _copy(path, folder)
-                return read(folder)
-        except JournalCorrupt:
-            raise
-        except (OSError, JournalError) as error:
-            first_error = first_error or error
-    raise JournalError(f'{path} cannot be copied: {first_error}') from first_error
-
-
-def _pad(path: Path) -> None:
-    """Extend a truncated file with zeros: SQLite reads no page of a shorter one."""
-    with path.open('r+b') as file:
-        header = file.read(32)
-        page = int.from_bytes(header[16:18], 'big')
-        length = min(page * int.from_bytes(header[28:32], 'big'), _MAX_SIZE)
-        if path.stat().st_size < length:
-            file.truncate(length)
-
-
-def _read_on(db: Any, query: str, found: dict[tuple[str, str], JournalRow]) -> None:
-    """Add rows to `found` until the query fails."""
-    try:
-        for each in db.execute(query):
-            row = _row(*each)
-            found.setdefault((row.kind, row.id), row)
-    except _FAILURES:
-        return
-
-
-def _copy(path: Path, folder: str) -> None:
-    """Copy the files of a journal under its usual name. Raises JournalError."""
-    try:
-        for suffix in _SUFFIXES[:2]:
-            if Path(f'{path}{suffix}').exists():
-                shutil.copyfile(f'{path}{suffix}', Path(folder, FILE_NAME + suffix))
-    except OSError as error:
-        raise JournalError(f'{path} cannot be read: {error}') from error

@@ -24,7 +24,7 @@ from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m, srv
 
 from uav_task_alloc.allocator.persistence.restore import restored_state
-from uav_task_alloc.journal import read_copy
+from uav_task_alloc.journal_recovery import read_copy
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
 
 UAVS = ('a', 'b', 'c', 'd')

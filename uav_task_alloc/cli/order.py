@@ -12,7 +12,7 @@ from importlib import import_module
 from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.cli.options import OptionParser
 from uav_task_alloc.errors import AllocError, InvalidValue
-from uav_task_alloc.journal import read_copy
+from uav_task_alloc.journal_recovery import read_copy
 
 _CLIENT = 'uav_task_alloc.nodes.order_client'  # needs ROS 2
 _EPILOG = """actions:

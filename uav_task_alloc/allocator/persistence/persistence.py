@@ -21,7 +21,8 @@ from uav_task_alloc.errors import (
     counted,
 )
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.journal import WAIT, Journal, JournalRow, read_copy, recover_rows, set_aside
+from uav_task_alloc.journal import WAIT, Journal, JournalRow
+from uav_task_alloc.journal_recovery import read_copy, recover_rows, set_aside
 
 _RETRY = 1.0  # [s] between two attempts on a disk that failed
 _SAME_ANGLE, _SAME_ALTITUDE = 1e-7, 0.01  # [deg], [m]: origins within 1 cm are equal
