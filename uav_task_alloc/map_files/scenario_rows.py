@@ -2,7 +2,6 @@
 """Turns elements of map files into the tasks, zones and UAVs of a scenario file."""
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ from uav_task_alloc.map_files.elements import (
     MapFileError,
     Place,
 )
+from uav_task_alloc.map_files.property_values import number_in, property_value
 from uav_task_alloc.scenario.key_hints import SAME_MEANING
 from uav_task_alloc.scenario.read import parse
 from uav_task_alloc.scenario.schema import TASK, UAV, ZONE
@@ -35,8 +35,6 @@ _OWN_KEYS = {'kind', 'path', 'holes'}.union(*_WORK_KEYS.values())
 _KEYS = {'tasks': TASK.keys() - _PLACE_KEYS - _OWN_KEYS,
          'zones': (ZONE.keys() - _PLACE_KEYS) | {'shape'},
          'uavs': UAV.keys() - _PLACE_KEYS}
-_LISTS = 'required_capabilities', 'allowed_uavs', 'capabilities'
-_NESTED = 'actions', 'camera'  # JSON values, or texts of them
 _KINDS = {'task': 'tasks', 'zone': 'zones', 'no_fly_zone': 'zones', 'uav': 'uavs',
           **dict.fromkeys(_WORK_KEYS, 'tasks'), 'fence_area': 'fence_area'}
 _GEOMETRIES = {'point': 'point', 'orbit': 'point', 'line': 'line', 'area': 'polygon',
@@ -246,7 +244,7 @@ class _Rows:
             raise MapFileError(f'{element.where}: {" and ".join(own)}: expected one of them')
         if own:
             key, given = next(iter(own.items()))
-            number = _number(given)
+            number = number_in(given)
             if not isinstance(number, (int, float)) or not abs(number) <= _HIGHEST:
                 raise MapFileError(f'{element.where}: {key} = {given!r}: expected a number [m]')
             return self._above_origin(number, AMSL if key == 'altitude_amsl' else ABOVE_ORIGIN)
@@ -268,7 +266,7 @@ class _Rows:
 
     def _add_zone(self, element: Element) -> None:
         place = element.places[0]
-        radius = _number(element.properties.get('radius', element.radius))
+        radius = number_in(element.properties.get('radius', element.radius))
         if element.geometry == 'polygon':
             if element.holes:
                 self.notes.append(f'{element.where}: the holes of the zone are closed')
@@ -295,7 +293,7 @@ class _Rows:
 
     def _append(self, kind: str, element: Element, name: str, row: dict[str, Any]) -> None:
         used = _KEYS[kind] | (_WORK_KEYS[row.get('kind', 'point')] if kind == 'tasks' else set())
-        properties = {key: _value(key, value) for key, value in element.properties.items()
+        properties = {key: property_value(key, value) for key, value in element.properties.items()
                       if key in used and value not in (None, '')}
         for meant in sorted(_HINTED & (_KEYS[kind] - properties.keys())):
             for key in sorted(element.properties.keys() & set(SAME_MEANING[meant].split())):
@@ -332,28 +330,3 @@ def _corners(ring: Iterable[Place]) -> list[dict[str, float]]:
 def _given_kind(element: Element) -> str:
     """What the property `kind` says; '' for none."""
     return str(element.properties.get('kind', '')).strip().lower().replace('-', '_')
-
-
-def _value(key: str, value: Any) -> Any:
-    """A property as scenarios have it: a number, a list of names, or a text."""
-    if key in _LISTS and not isinstance(value, list):
-        return [part for part in re.split(r'[,;\s]+', str(value)) if part]
-    if key in _NESTED and isinstance(value, str):
-        try:
-            return json.loads(value)
-        except ValueError:
-            return value
-    if isinstance(value, (dict, list)):
-        return value if key in _LISTS + _NESTED else json.dumps(value)
-    return _number(value)
-
-
-def _number(value: Any) -> Any:
-    """A text as the number that it is, else unchanged; infinities stay texts of YAML."""
-    if not isinstance(value, str):
-        return value
-    try:
-        number = float(value)
-    except ValueError:
-        return value.strip()
-    return int(number) if number.is_integer() and abs(number) < 1e15 else number
