@@ -11,15 +11,8 @@ import yaml
 
 from uav_task_alloc.errors import ScenarioError
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.map_files.elements import (
-    ABOVE_ORIGIN,
-    AMSL,
-    UNSAID,
-    Element,
-    MapFile,
-    MapFileError,
-    Place,
-)
+from uav_task_alloc.map_files.altitudes import Altitudes
+from uav_task_alloc.map_files.elements import Element, MapFile, MapFileError, Place
 from uav_task_alloc.map_files.property_values import number_in, property_value
 from uav_task_alloc.scenario.key_hints import SAME_MEANING
 from uav_task_alloc.scenario.read import parse
@@ -43,7 +36,6 @@ _HINTED = {'value', 'service_time', 'latest'}  # keys for which a hint names oth
 _RESULTS = 'route', 'track'  # written by map_files.write
 _ROW = re.compile(r':\d+: (scenario\.(tasks|zones|uavs)\[(\d+)\].*)', re.DOTALL)
 _ONE_PLACE = {'latitude': 2e-7, 'longitude': 2e-7, 'altitude': 0.02}  # [deg], [m]
-_HIGHEST = 1e6  # [m] of an altitude
 _SHIFT = 5.0 / 111_000.0  # [deg] of latitude: UAVs without a place start 5 m apart
 
 
@@ -140,7 +132,8 @@ class _Rows:
     """The rows of the new scenario, beside those of its fleet."""
 
     def __init__(self, origin: Origin, choices: ImportChoices, document: dict[str, Any]) -> None:
-        self.origin, self.choices, self.document = origin, choices, document
+        self.choices, self.document = choices, document
+        self._altitudes = Altitudes(origin, choices.altitudes)
         self.places: dict[tuple[str, int], str] = {}  # (kind, index): file and element
         self.notes: list[str] = []
         self.added = 0
@@ -197,7 +190,7 @@ class _Rows:
         path: list[dict[str, float]] = []
         for place in element.places:
             corner = {'latitude': place.latitude, 'longitude': place.longitude,
-                      'altitude': self._altitude(element, place, self.choices.height)}
+                      'altitude': self._altitudes.height(element, place, self.choices.height)}
             if not path or any(abs(corner[key] - path[-1][key]) > least
                                for key, least in _ONE_PLACE.items()):
                 path.append(corner)
@@ -234,35 +227,7 @@ class _Rows:
         orbit = {'kind': 'orbit'} if _given_kind(element) == 'orbit' else {}
         self._append(kind, element, name, {
             **orbit, 'latitude': place.latitude, 'longitude': place.longitude,
-            'altitude': self._altitude(element, place, without)})
-
-    def _altitude(self, element: Element, place: Place, without: float) -> float:
-        """Height [m] above the origin."""
-        own = {key: element.properties[key] for key in ('altitude', 'altitude_amsl')
-               if str(element.properties.get(key, '')).strip()}
-        if len(own) > 1:
-            raise MapFileError(f'{element.where}: {" and ".join(own)}: expected one of them')
-        if own:
-            key, given = next(iter(own.items()))
-            number = number_in(given)
-            if not isinstance(number, (int, float)) or not abs(number) <= _HIGHEST:
-                raise MapFileError(f'{element.where}: {key} = {given!r}: expected a number [m]')
-            return self._above_origin(number, AMSL if key == 'altitude_amsl' else ABOVE_ORIGIN)
-        if place.altitude is None or not element.reference:
-            return without
-        if element.reference != UNSAID:
-            return self._above_origin(place.altitude, element.reference)
-        if self.choices.altitudes == 'ignore' or (place.altitude == 0.0
-                                                  and not self.choices.altitudes):
-            return without
-        if not self.choices.altitudes:
-            raise MapFileError(
-                f'{element.where}: altitude {place.altitude:g}, and the file does not say above '
-                'what: expected --altitudes amsl, origin or ignore')
-        return self._above_origin(place.altitude, self.choices.altitudes)
-
-    def _above_origin(self, altitude: float, reference: str) -> float:
-        return altitude - self.origin.altitude_amsl if reference == AMSL else altitude
+            'altitude': self._altitudes.height(element, place, without)})
 
     def _add_zone(self, element: Element) -> None:
         place = element.places[0]
@@ -278,7 +243,7 @@ class _Rows:
             row = {'shape': 'cylinder', 'latitude': place.latitude,
                    'longitude': place.longitude, 'radius': radius}
             if element.properties.get('shape') == 'hemisphere':
-                row['altitude'] = self._altitude(element, place, 0.0)
+                row['altitude'] = self._altitudes.height(element, place, 0.0)
         self._append('zones', element, element.name, row)
 
     def _set_area(self, element: Element) -> None:
