@@ -14,6 +14,7 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.map_files.altitudes import Altitudes
 from uav_task_alloc.map_files.elements import Element, MapFile, MapFileError, Place
 from uav_task_alloc.map_files.property_values import number_in, property_value
+from uav_task_alloc.map_files.scenario_ids import ScenarioIds
 from uav_task_alloc.scenario.key_hints import SAME_MEANING
 from uav_task_alloc.scenario.read import parse
 from uav_task_alloc.scenario.schema import TASK, UAV, ZONE
@@ -137,12 +138,11 @@ class _Rows:
         self.places: dict[tuple[str, int], str] = {}  # (kind, index): file and element
         self.notes: list[str] = []
         self.added = 0
-        self._renamed: list[str] = []
         self._unused: dict[tuple[str, str], str] = {}  # first element by property and our key
         for kind in _KEYS:
             document[kind] = list(document.get(kind) or ())
-        self._taken = {kind: {row.get('id') for row in document[kind] if isinstance(row, dict)}
-                       for kind in _KEYS}
+        self._ids = ScenarioIds({kind: [row.get('id') for row in document[kind]
+                                        if isinstance(row, dict)] for kind in _KEYS})
 
     def add(self, element: Element) -> None:
         """Add what an element means, or a note of why it is left out."""
@@ -187,13 +187,10 @@ class _Rows:
 
     def _add_work(self, kind: str, element: Element, row: dict[str, Any]) -> None:
         """Add a line or an area, of which points that repeat the one before are left out."""
-        path: list[dict[str, float]] = []
-        for place in element.places:
-            corner = {'latitude': place.latitude, 'longitude': place.longitude,
-                      'altitude': self._altitudes.height(element, place, self.choices.height)}
-            if not path or any(abs(corner[key] - path[-1][key]) > least
-                               for key, least in _ONE_PLACE.items()):
-                path.append(corner)
+        path = _without_repeats(
+            {'latitude': place.latitude, 'longitude': place.longitude,
+             'altitude': self._altitudes.height(element, place, self.choices.height)}
+            for place in element.places)
         if not 1 < len(path) <= MOST_CORNERS:
             self.notes.append(f'{element.where}: a {element.geometry} of {len(path)} points: '
                               f'expected 2 to {MOST_CORNERS}')
@@ -205,9 +202,7 @@ class _Rows:
         """What is left out or changed; of what recurs the first, and how many."""
         unused = [f'{where}: {key!r} is not used; {meant!r} is'
                   for (key, meant), where in self._unused.items()]
-        more = len(self._renamed) - 1
-        return self.notes + unused + [text + f'; {more} more names are changed' * bool(more)
-                                      for text in self._renamed[:1]]
+        return self.notes + unused + self._ids.notes()
 
     def _kind(self, element: Element) -> str:
         given = _given_kind(element)
@@ -263,33 +258,24 @@ class _Rows:
         for meant in sorted(_HINTED & (_KEYS[kind] - properties.keys())):
             for key in sorted(element.properties.keys() & set(SAME_MEANING[meant].split())):
                 self._unused.setdefault((key, meant), element.where)
-        identifier = self._id(kind, name, element)
+        identifier = self._ids.take(kind, name, element.where)
         self.places[kind, len(self.document[kind])] = element.where
         self.document[kind].append({'id': identifier, **row, **properties})
         self.added += 1
 
-    def _id(self, kind: str, name: str, element: Element) -> str:
-        """A name as scenarios allow it, that nothing else of its kind has."""
-        stem = re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_') or kind[:-1]
-        stem = stem if stem[0].isalpha() else f'{kind[0]}{stem}'
-        identifier, number = stem, 2
-        while identifier in self._taken[kind]:
-            identifier, number = f'{stem}_{number}', number + 1
-        self._taken[kind].add(identifier)
-        if name and identifier != name:
-            self._renamed.append(f'{element.where}: its id is {identifier}')
-        return identifier
-
 
 def _corners(ring: Iterable[Place]) -> list[dict[str, float]]:
-    """Corners of a ring, of which those that repeat the one before are left out."""
-    corners: list[dict[str, float]] = []
-    for place in ring:
-        corner = {'latitude': place.latitude, 'longitude': place.longitude}
-        if not corners or any(abs(corner[key] - corners[-1][key]) > _ONE_PLACE[key]
-                              for key in corner):
-            corners.append(corner)
-    return corners
+    return _without_repeats({'latitude': place.latitude, 'longitude': place.longitude}
+                            for place in ring)
+
+
+def _without_repeats(points: Iterable[dict[str, float]]) -> list[dict[str, float]]:
+    """Points, of which those that repeat the one before are left out."""
+    kept: list[dict[str, float]] = []
+    for point in points:
+        if not kept or any(abs(point[key] - kept[-1][key]) > _ONE_PLACE[key] for key in point):
+            kept.append(point)
+    return kept
 
 
 def _given_kind(element: Element) -> str:
