@@ -29,6 +29,7 @@ def test_of_changed_names_the_first_is_named_and_the_others_are_counted():
     assert made.notes() == []
     made.take('tasks', 'Mast 7', 'a.kml: 2')
     assert made.notes() == ['a.kml: 2: its id is Mast_7']
-    for name in ('Mast 8', 'Mast 9'):
-        made.take('tasks', name, 'a.kml: 3')
+    made.take('tasks', 'Mast 8', 'a.kml: 3')
+    assert made.notes() == ['a.kml: 2: its id is Mast_7; 1 more name is changed']
+    made.take('tasks', 'Mast 9', 'a.kml: 4')
     assert made.notes() == ['a.kml: 2: its id is Mast_7; 2 more names are changed']

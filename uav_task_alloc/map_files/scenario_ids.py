@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
+from uav_task_alloc.errors import counted
+
 
 class ScenarioIds:
     """The ids that are taken, and which names had to be changed.
@@ -41,5 +43,5 @@ class ScenarioIds:
     def notes(self) -> list[str]:
         """The first name that was changed, and how many more; empty where none was."""
         more = len(self._changed) - 1
-        return [text + f'; {more} more names are changed' * bool(more)
-                for text in self._changed[:1]]
+        others = f'; {counted(more, "more name")} {"is" if more == 1 else "are"} changed'
+        return [text + others * bool(more) for text in self._changed[:1]]
