@@ -268,6 +268,14 @@ def test_a_task_that_the_allocator_has_forgotten_stays_as_it_ended():
     assert row_of(report_page(history, 'x'), 'u1')[0] == '2'
 
 
+def test_a_task_from_before_the_recording_is_counted_after_the_allocator_has_forgotten_it():
+    begin = [state(0.0, 0.0), statuses(1.0, a='ACTIVE', b='ACTIVE'),
+             statuses(10.0, a='COMPLETED', b='ACTIVE')]
+    for more in ([], [statuses(20.0, b='ACTIVE')]):
+        figures = dict(key_figures(read_history([*begin, *more])))
+        assert figures['tasks completed'] == 1
+
+
 def test_the_pieces_that_a_uav_flew_are_counted_for_it():
     whole = {'task': 'f', 'state': 'COMPLETED', 'uav': '', 'reason': '', 'done': 2, 'pieces': 2}
     line = statuses(10.0, **{'f#1': 'COMPLETED', 'f#2': 'COMPLETED'})

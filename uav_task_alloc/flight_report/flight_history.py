@@ -228,7 +228,7 @@ class FlightHistory:
 
     def tasks(self) -> dict[str, Point | None]:
         """All tasks announced or with a status, and their positions [m] where known."""
-        names = {**dict.fromkeys(self.run.tasks), **dict.fromkeys(self.run.statuses.tasks)}
+        names = {**dict.fromkeys(self.run.tasks), **dict.fromkeys(self.run.statuses.known())}
         announced = {name: task.position for name, task in self.run.tasks.items()}
         return {name: self.positions.get(name) or announced.get(name) for name in names}
 
