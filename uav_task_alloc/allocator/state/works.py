@@ -11,22 +11,20 @@ from dataclasses import replace
 
 from uav_task_alloc.allocator.records import TaskRecord, TaskState, TaskVerdict
 from uav_task_alloc.allocator.state.flown_strips import pieces_around_flown
+from uav_task_alloc.allocator.state.matched_pieces import match_pieces
 from uav_task_alloc.allocator.state.task_state_machine import TaskTransition
 from uav_task_alloc.allocator.state.tasks import MAX_OPEN, UNCHANGED, TaskRegistry
+from uav_task_alloc.allocator.state.work_state import record_of_whole, state_of_pieces
 from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.polyline import polyline_length
-from uav_task_alloc.model import Point, Task
+from uav_task_alloc.model import Task
 from uav_task_alloc.piece_ids import piece_id, split_piece
 from uav_task_alloc.terrain import TerrainError
 from uav_task_alloc.work.area import NOTHING_FLOWN, FlownStrips
 from uav_task_alloc.work.pieces import Work
-from uav_task_alloc.work.recut import FlownWays, main_direction, way_key
+from uav_task_alloc.work.recut import FlownWays, main_direction
 from uav_task_alloc.work.values import Kind
 
-# the state of the whole is the first of these that an open piece has
-_OPEN_ORDER = (TaskState.ACTIVE, TaskState.ASSIGNED, TaskState.PENDING, TaskState.UNASSIGNED)
-_WORDS = {Kind.AREA: 'strips', Kind.LINE: 'sections', Kind.ORBIT: 'orbits'}
 CutWork = Callable[[Work, FlownStrips], Sequence[Task]]
 _NO_CUT = InvalidValue, TerrainError
 
@@ -45,6 +43,7 @@ class Works:
         task_id: of work, or of any task where the text says so.
         stamp: [s] clock of the node.
         why: that pieces are cut again.
+        known: accepted work.
     """
 
     def __init__(self, tasks: TaskRegistry, saved: Iterable[WorkRecord], cut: CutWork,
@@ -184,26 +183,20 @@ class Works:
                renew: bool = False) -> bool:
         """Take over a new cut: equal pieces keep their ids, and what is flown is left out."""
         present = {record.task.id: record for record in self._present(known)}
+        unflown = [record for record in present.values()
+                   if record.state is not TaskState.COMPLETED]
         # flown strips that were narrower count for what they have covered only
         wide = [record for record in self._flown(known) if not _is_narrow(known, record.task.id)]
-        flown_by_way = _ids_by_way(wide)
-        by_way = _ids_by_way(record for record in present.values()
-                             if record.state is not TaskState.COMPLETED)
-        done = [_taken(flown_by_way, piece) for piece in pieces]
-        flown = FlownWays(record.task.path for record in wide if record.task.id not in done)
         kept, last, changed = list[str](), known.last, False
-        for piece, whole in zip(pieces, done, strict=True):
-            if whole:
-                kept.append(whole)
-                continue
-            for part in _parts(piece, flown):
-                if same := _taken(by_way, part):
-                    changed |= renew and self._renew(present[same], part, stamp)
-                else:
-                    last, changed = last + 1, True
-                    same = piece_id(known.id, last)
-                    self._tasks.add(replace(part, id=same), stamp)
-                kept.append(same)
+        for found in match_pieces(pieces, unflown, wide):
+            task_id = found.known
+            if not task_id:
+                last, changed = last + 1, True
+                task_id = piece_id(known.id, last)
+                self._tasks.add(replace(found.task, id=task_id), stamp)
+            elif renew and not found.flown:
+                changed |= self._renew(present[task_id], found.task, stamp)
+            kept.append(task_id)
         ended = [each for each in known.pieces if each in present and each not in kept
                 and present[each].state is TaskState.COMPLETED]
         gone = [each for each in present if each not in kept and each not in ended]
@@ -273,38 +266,12 @@ class Works:
         return tuple(record.task.id for record in self._present(known) if record.open)
 
     def state(self, known: WorkRecord) -> TaskState:
-        """Return the state of work, as its pieces have it.
-
-        Args:
-            known: accepted work.
-        """
-        states = {record.state for record in self._present(known)}
-        for state in (*_OPEN_ORDER, TaskState.CANCELLED, TaskState.FAILED):
-            if state in states:
-                return state
-        return TaskState.COMPLETED
+        """Return the state of accepted work, as its pieces have it."""
+        return state_of_pieces(self._present(known))
 
     def whole_record(self, known: WorkRecord) -> tuple[TaskRecord, int]:
-        """Return work as the record of one task, and how many of its pieces are completed.
-
-        Args:
-            known: accepted work.
-
-        Returns:
-            Its reason begins with `7 of 12 strips`; the UAV is that of its pieces in this state,
-            where it is one.
-        """
-        present, state = self._present(known), self.state(known)
-        done = sum(record.state is TaskState.COMPLETED for record in present)
-        of_state = [record for record in present if record.state is state]
-        uavs = {record.uav for record in of_state}
-        why = next((record.reason for record in of_state if record.reason), '')
-        text = f'{done} of {len(present)} {_WORDS.get(known.work.kind, "pieces")}'
-        return TaskRecord(
-            known.work.task, known.announced.task, state, uavs.pop() if len(uavs) == 1 else '',
-            text if state is TaskState.COMPLETED or not why else f'{text}; {why}',
-            max((record.stamp for record in present), default=0.0),
-            since=min((record.since for record in present), default=0.0)), done
+        """Return accepted work as the record of one task, see `record_of_whole`."""
+        return record_of_whole(known, self._present(known))
 
     # forgetting
 
@@ -347,30 +314,3 @@ class Works:
 def _is_narrow(known: WorkRecord, task_id: str) -> bool:
     """Whether a strip was cut for a smaller strip_width than the present one."""
     return known.strip_width(split_piece(task_id)[1]) < known.work.strip_width
-
-
-def _ids_by_way(records: Iterable[TaskRecord]) -> dict[tuple[Point, ...], list[str]]:
-    """Ids of pieces by their ways."""
-    found = dict[tuple[Point, ...], list[str]]()
-    for record in records:
-        found.setdefault(way_key(record.task.path, record.task.reversible), []).append(
-            record.task.id)
-    return found
-
-
-def _taken(by_way: dict[tuple[Point, ...], list[str]], piece: Task) -> str:
-    """The id of a piece with the way of another one, taken out of `by_way`; '' for none."""
-    alike = by_way.get(way_key(piece.path, piece.reversible))
-    return alike.pop(0) if alike else ''
-
-
-def _parts(piece: Task, flown: FlownWays) -> list[Task]:
-    """A piece of a new cut, or what is not flown of it, with its share of the value."""
-    ways = flown.unflown_parts(piece.path)
-    if ways == [piece.path]:
-        return [piece]
-    length = piece.path_length
-    return [replace(piece, position=way[0], path=way,
-                    value=piece.value * polyline_length(way) / length,
-                    service_time=piece.service_time * polyline_length(way) / length)
-            for way in ways]
