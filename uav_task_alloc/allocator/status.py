@@ -149,7 +149,8 @@ def _uav_warnings(world: World, stamp: float | None) -> list[str]:
     silent = [uav_id for uav_id, record in records
               if record.silent and not flights.in_battery_change(uav_id, stamp)]
     low = [uav_id for uav_id, record in records if record.low]
-    doubled = [uav_id for uav_id, record in records if record.in_two_places and not record.silent]
+    doubled = [uav_id for uav_id, record in records
+               if world.jumps.in_two_places(uav_id) and not record.silent]
     return [f'{text}: {first_of(uavs, _MAX_NAMED)}'
             for text, uavs in (('silent', silent), ('battery low', low),
                                ('reported from two places in turn, expected one source each',

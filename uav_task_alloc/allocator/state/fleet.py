@@ -12,8 +12,6 @@ from uav_task_alloc.errors import first_of
 from uav_task_alloc.model import Point, Task, Uav
 from uav_task_alloc.params import AllocatorParams
 
-_FASTEST = 10.0  # times the cruise speed: faster is a jump, in accelerated simulations too
-_JUMPS_APART, _SEVERAL_JUMPS = 2.0, 4  # [s] at most, and how many then show two sources
 _MAX_NAMED = 5  # UAVs in a reason
 LEAST_ENDURANCE = 1.0  # [s] of a UAV that has none left
 _RECHARGED = 0.1  # [0..1] above the reserve: a battery that was low is good again
@@ -36,18 +34,11 @@ class UavRecord:
     # [0..1] charge from which on its battery was changed, for which it was sent home; None: it
     # was not sent, or has it
     change_from: float | None = None
-    jumped: float = -math.inf  # [s] steady clock: the position last jumped
-    jumps: int = 0  # of the position, shortly after one another
 
     @property
     def inside_zone(self) -> bool:
         """Whether it is inside a zone."""
         return bool(self.zone)
-
-    @property
-    def in_two_places(self) -> bool:
-        """Whether its position keeps jumping: two sources report under its id."""
-        return self.jumps >= _SEVERAL_JUMPS
 
     @property
     def ready(self) -> bool:
@@ -117,8 +108,7 @@ class Fleet:
         if before:
             self.records[uav_id] = replace(
                 self.records[uav_id], zone=before.zone, home_zone=before.home_zone,
-                blocked_on_ground=before.blocked_on_ground, jumped=before.jumped,
-                jumps=before.jumps if now - before.jumped <= _JUMPS_APART else 0)
+                blocked_on_ground=before.blocked_on_ground)
         if battery is not None and battery >= self.change_from.get(uav_id, math.inf):
             self.end_change(uav_id)
         return before
@@ -164,11 +154,6 @@ class Fleet:
             self.change_from.pop(uav_id, None)
         else:
             self.change_from[uav_id] = change_from
-
-    def set_jumped(self, uav_id: str, now: float) -> None:
-        """Record that the position jumped."""
-        record = self.records[uav_id]
-        self.records[uav_id] = replace(record, jumped=now, jumps=record.jumps + 1)
 
     def set_zone(self, uav_id: str, zone: str, home_zone: str, blocked_on_ground: str) -> None:
         """Record the zones that a UAV and its home are inside, and why it gets no tasks."""
@@ -326,20 +311,3 @@ def _can_more(before: UavRecord, after: UavRecord) -> str:
             after.battery >= before.battery + _RECHARGED):
         return 'has another battery'
     return ''
-
-
-def jump_distance(before: UavRecord | None, report: UavReport, now: float, speed: float,
-                  most: float) -> float:
-    """Return how far a position jumped [m]; 0.0 where the UAV can have flown there.
-
-    Args:
-        before: record of the last report.
-        report: the new one.
-        now: [s] steady clock.
-        speed: cruise speed [m/s]; ten times as fast is no jump.
-        most: [m] beyond that flight which are no jump.
-    """
-    if before is None or before.silent:
-        return 0.0
-    metres = math.dist(before.report.position, report.position)
-    return metres if metres > most + _FASTEST * speed * (now - before.received) else 0.0

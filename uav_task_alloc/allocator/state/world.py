@@ -22,7 +22,7 @@ from uav_task_alloc.allocator.state.airspace import Airspace
 from uav_task_alloc.allocator.state.announcements import Announcements
 from uav_task_alloc.allocator.state.callbacks import RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
-from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord, jump_distance, replan_reasons
+from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord, replan_reasons
 from uav_task_alloc.allocator.state.flights import Flights
 from uav_task_alloc.allocator.state.ground import Ground
 from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
@@ -30,6 +30,7 @@ from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
 from uav_task_alloc.allocator.state.missed_completions import MissedCompletions
 from uav_task_alloc.allocator.state.ordered_tasks import OrderedTasks
 from uav_task_alloc.allocator.state.orders import Orders
+from uav_task_alloc.allocator.state.position_jumps import PositionJumps
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths
 from uav_task_alloc.allocator.state.seen_tasks import SeenTasks
@@ -104,6 +105,7 @@ class World:
         self.deadlines = Deadlines(self.tasks, self.fleet, self.flights)
         self.zone_checks = ZoneChecks(self.fleet, self.lists, paths, self.note,
                                       self.request_replan)
+        self.jumps = PositionJumps(lambda: self.params, self.note, self.request_replan)
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
         self.ground = Ground(terrain, self.airspace.no_fly_zones, lambda: self.params)
         self.works = Works(self.tasks, saved.works, self.ground.cut, self.deadlines.refusal)
@@ -153,7 +155,7 @@ class World:
                 {each.task.id for each in self.tasks.open()} - self.lists.owners().keys())):
             self.note(f'{uav_id} {reason}')
             self.request_replan(f'{uav_id} {reason}', now)
-        self._check_jump(before, report, now)
+        self.jumps.check(before, report, now)
         if before is None or active != self.fleet.active.get(uav_id):
             self.outbox.statuses = True
         if before is None and (why := self.ground.differs(report)):
@@ -163,17 +165,6 @@ class World:
         if self.kernels_ready:
             self.zone_checks.check_reported(uav_id, now)
         return ''
-
-    def _check_jump(self, before: UavRecord | None, report: UavReport, now: float) -> None:
-        """A position that cannot have been flown to is accepted, logged once, and planned for."""
-        speed = report.cruise_speed or self.params.default_cruise_speed
-        metres = jump_distance(before, report, now, speed, self.params.position_jump)
-        if before is None or not metres:
-            return
-        if now - before.jumped > self.params.uav_timeout:
-            self.note(f'{report.uav_id} jumped by {metres:.0f} m', warning=True)
-        self.fleet.set_jumped(report.uav_id, now)
-        self.request_replan(f'{report.uav_id} jumped', now)
 
     def event(self, event: TaskEvent, stamp: float, now: float) -> str:
         """Apply the progress of a task; returns why it is refused, '' if it is not."""
@@ -250,6 +241,7 @@ class World:
         self._events.forget(uav_id)
         self._validity.forget(uav_id)
         self.flights.forget(uav_id)
+        self.jumps.forget(uav_id)
 
     def forget_ended(self) -> None:
         """Remove ended tasks beyond `keep_ended`."""
