@@ -27,6 +27,7 @@ from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
 from uav_task_alloc.allocator.replanning.waiting_places import WaitingPlaces
 from uav_task_alloc.allocator.separation_watch import SeparationWatch
+from uav_task_alloc.allocator.state.list_updates import ListUpdates
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.journal import JournalRow
@@ -72,6 +73,7 @@ class Allocator:
                            self.schedule.add_trigger, terrain)
         self.approvals = Approvals(self.world)
         self.separation = SeparationWatch(self.world)
+        self._list_updates = ListUpdates(self.world.tasks, self.world.lists, self.world.flights)
         self.batteries = BatteryWatch(self.world)
         self.waiting = WaitingPlaces(self.world)
         self._changes = BatteryChanges(self.world, self.waiting)
@@ -106,8 +108,8 @@ class Allocator:
         self.batteries.tick(now, stamp)
         self._end_orders(stamp)
         self._changes.end(now, stamp)
-        world.publish(world.shortened_lists(stamp), stamp)
-        world.publish(world.lists_to_resend(stamp), stamp, resend=True)
+        world.publish(self._list_updates.shortened(stamp), stamp)
+        world.publish(self._list_updates.to_resend(stamp), stamp, resend=True)
         if self._restarted:  # the plan of the previous run is published before any other
             self._restarted = False
             self._publisher.allocate(Plan({}), 'restart', stamp)

@@ -56,8 +56,7 @@ class PlanPublisher:
     def put(self, built: BuiltLists, chosen: Plan, now: float, stamp: float) -> list[str]:
         """Put lists of a plan in force; returns the UAVs whose lists changed."""
         world = self._world
-        world.set_built(built.zones_when_built, built.paths_home)
-        world.later = built.later
+        world.set_built(built.zones_when_built, built.paths_home, built.later)
         for text in built.together:
             if text not in self._together:
                 world.note(text, warning=True)

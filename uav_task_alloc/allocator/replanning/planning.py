@@ -243,7 +243,7 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
         tasks = [world.task_records()[task_id].task for task_id in task_ids]
         home = returns or uav_id in built.later
         waits = not (tasks or home) and way_to_place_is_clear(world, world.list_of(uav_id))
-        if waits or world.is_current(uav_id, tasks, home, backward):
+        if waits or world.validity.is_current(uav_id, tasks, home, backward):
             built.lists[uav_id] = world.list_of(uav_id)
             continue
         unreachable = build_list(world, built, uav_id, tasks, home, legs, stamp, backward)

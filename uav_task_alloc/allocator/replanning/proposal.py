@@ -86,7 +86,7 @@ def _why_at_once(world: World, uav_id: str, before: TaskIdsByUav, after: TaskIds
     """Why a UAV may not wait for another list; '' if it may."""
     gained = {*after[uav_id]}.difference(before.get(uav_id, ()))
     ordered = any(world.orders.owner(task_id) == uav_id for task_id in gained)
-    return world.why_change(uav_id) or ('an order' if ordered else '')
+    return world.validity.why_change(uav_id) or ('an order' if ordered else '')
 
 
 def _tasks_of(proposal: Proposal) -> Iterator[str]:

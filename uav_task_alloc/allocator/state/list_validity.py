@@ -16,20 +16,41 @@ ZonesWhenBuilt = Mapping[str, tuple[SafePaths, Point]]  # UAV -> paths, and its 
 
 
 class ListValidity:
-    """Compares the lists in force with the present tasks, UAVs and zones."""
+    """Compares the lists in force with the present tasks, UAVs and zones.
+
+    Args:
+        tasks, fleet, lists, ordered: the present state.
+        paths: returns those around the present zones.
+        stranded: UAVs without a safe path home; their lists end without a return.
+    """
 
     def __init__(self, tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
-                 paths: GetSafePaths, ordered: OrderedTasks) -> None:
+                 paths: GetSafePaths, ordered: OrderedTasks, stranded: Collection[str]) -> None:
         self._tasks, self._fleet, self._lists, self._paths = tasks, fleet, lists, paths
-        self._ordered = ordered
+        self._ordered, self._stranded = ordered, stranded
         self.zones_when_built: dict[str, tuple[SafePaths, Point]] = {}
 
-    def is_current(self, uav_id: str, tasks: Sequence[Task], backward: Collection[str]) -> bool:
-        """Return whether the list in force has these tasks, and was built for present zones.
+    def is_current(self, uav_id: str, tasks: Sequence[Task], returns: bool,
+                   backward: Collection[str] = ()) -> bool:
+        """Return whether the list in force has these tasks and end, and fits the present zones.
 
-        A list whose leg under way is cut, or whose UAV is inside a zone, is not. `backward` are
-        the ids of tasks whose paths are flown from the last point; under way that does not change.
+        A list whose leg under way is cut, or whose UAV is inside a zone, does not.
+
+        Args:
+            uav_id: a known UAV.
+            tasks: in the order of flight.
+            returns: whether its list should end with a return home.
+            backward: ids of the tasks whose paths are flown from the last point; under way that
+                does not change.
         """
+        return self._has_tasks(uav_id, tasks, backward) and (
+            self._lists.get(uav_id).returns or not self._returns(uav_id, returns))
+
+    def _returns(self, uav_id: str, returns: bool) -> bool:
+        return returns and uav_id not in self._stranded
+
+    def _has_tasks(self, uav_id: str, tasks: Sequence[Task], backward: Collection[str]) -> bool:
+        """Whether the list in force has these tasks, and was built for the present zones."""
         stops, paths = self._lists.get(uav_id).stops, self._paths()
         record = self._fleet.records[uav_id]
         return (bool(stops) and self.zones_when_built.get(uav_id) == (paths, record.home)
@@ -55,7 +76,7 @@ class ListValidity:
             known = self._tasks.records.get(stop.task.id)
             if known is None or not known.open or known.task != stop.task:
                 return True
-        return published.returns != returns
+        return published.returns != self._returns(uav_id, returns)
 
     def why_change(self, uav_id: str) -> str:
         """Return why the list in force of a UAV may not wait for another one; '' if it may.

@@ -74,8 +74,6 @@ class World:
         warning, debug: its level in the log; otherwise information.
         kind: of a journal row.
         resend: publish unchanged lists, too.
-        returns: whether the list should end with a return home.
-        backward: ids of the tasks whose paths are flown from the last point.
     """
 
     def __init__(self, params: AllocatorParams, saved: SavedState,
@@ -101,10 +99,11 @@ class World:
         self.flights = Flights(self.fleet, self.lists, lambda: self.params)
         self.ordered = OrderedTasks(self.tasks, self.flights, self.fleet, self.lists, paths,
                                     self.uav)
-        self._validity = ListValidity(self.tasks, self.fleet, self.lists, paths, self.ordered)
         self.deadlines = Deadlines(self.tasks, self.fleet, self.flights)
         self.zone_checks = ZoneChecks(self.fleet, self.lists, paths, self.note,
                                       self.request_replan)
+        self.validity = ListValidity(self.tasks, self.fleet, self.lists, paths, self.ordered,
+                                     self.zone_checks.stranded)
         self.jumps = PositionJumps(lambda: self.params, self.note, self.request_replan)
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
         self.ground = Ground(terrain, self.airspace.no_fly_zones, lambda: self.params)
@@ -239,7 +238,7 @@ class World:
         self.lists.forget_uav(uav_id)
         self.zone_checks.forget(uav_id)
         self._events.forget(uav_id)
-        self._validity.forget(uav_id)
+        self.validity.forget(uav_id)
         self.flights.forget(uav_id)
         self.jumps.forget(uav_id)
 
@@ -298,35 +297,24 @@ class World:
         """Return whether a task is open and a known UAV may fly it."""
         return can_fly(self.tasks, self.fleet, uav_id, task_id)
 
-    def is_current(self, uav_id: str, tasks: Sequence[Task], returns: bool,
-                   backward: Collection[str] = ()) -> bool:
-        """Return whether the list in force has these tasks and end, and fits the zones."""
-        return self._validity.is_current(uav_id, tasks, backward) and (
-            self.lists.get(uav_id).returns or not self._returns(uav_id, returns))
-
     def must_change(self, uav_id: str) -> bool:
         """Return whether the list in force of a UAV cannot or may not be flown."""
-        return self._validity.must_change(uav_id, self._returns(
-            uav_id, self.params.route_end == 'home' or uav_id in self.later))
-
-    def _returns(self, uav_id: str, returns: bool) -> bool:
-        return returns and uav_id not in self.zone_checks.stranded
-
-    def why_change(self, uav_id: str) -> str:
-        """Return why the list in force of a UAV may not wait for another one; '' if it may."""
-        return self._validity.why_change(uav_id)
+        return self.validity.must_change(
+            uav_id, self.params.route_end == 'home' or uav_id in self.later)
 
     # results of the planner
 
     def set_built(self, zones_when_built: ZonesWhenBuilt,
-                  paths_home: Mapping[str, tuple[bool, Point]]) -> None:
+                  paths_home: Mapping[str, tuple[bool, Point]], later: LaterTrips) -> None:
         """Record what lists were built for.
 
         Args:
             zones_when_built: the paths, and the home [m], by UAV.
             paths_home: whether there is a safe path home, and from where [m], by UAV.
+            later: trips of the plan, after the lists.
         """
-        self._validity.zones_when_built.update(zones_when_built)
+        self.later = later
+        self.validity.zones_when_built.update(zones_when_built)
         for uav_id, (exists, start) in paths_home.items():
             self.zone_checks.set_path_home(uav_id, exists, start)
 
@@ -342,23 +330,6 @@ class World:
         published = {each.uav: each for each in revised if each}
         self.outbox.lists.update(published)
         return list(published)
-
-    def shortened_lists(self, stamp: float) -> dict[str, UavList]:
-        """Return the lists with ended tasks at their front, without those."""
-        shorter = {uav_id: self.lists.without_ended(uav_id, self._ended, stamp,
-                                                    self.flights.of(uav_id, stamp))
-                   for uav_id, each in self.lists.lists.items()
-                   if each.stops and self._ended(each.stops[0].task.id)}
-        return {uav_id: each for uav_id, each in shorter.items() if each is not None}
-
-    def lists_to_resend(self, stamp: float) -> dict[str, UavList]:
-        """Return the lists to publish again; one with a later ended task waits for a plan."""
-        return {uav_id: self.lists.restamped(uav_id, stamp, self.flights.of(uav_id, stamp))
-                for uav_id in sorted(self.lists.to_resend)
-                if not any(map(self._ended, self.lists.get(uav_id).task_ids))}
-
-    def _ended(self, task_id: str) -> bool:
-        return not self.tasks.is_open(task_id)
 
     def next_revision(self) -> int:
         """Return the revision of the next allocation."""
