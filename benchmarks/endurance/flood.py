@@ -40,7 +40,7 @@ from uav_task_alloc.nodes.ros.run import run
 
 UAVS, RATE, SIDE, TICK = 200, 1000, 10_000.0, 0.02  # states/s, [m], [s]
 REST = 5.0  # [s] of states before the flood and after the last task is answered
-TIMED = ('on_state', 'on_tasks', 'on_zones', 'on_event', 'on_submit', 'on_step', 'on_results',
+TIMED = ('on_state', 'on_tasks', 'on_zones', 'on_event', 'on_step', 'on_results',
          'publish_diagnostics')
 
 

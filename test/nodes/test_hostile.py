@@ -146,8 +146,9 @@ def callbacks_of(node):
     """The callback for each message type."""
     return {m.UavState: node.on_state, m.TaskAnnouncement: node.on_tasks,
             m.ThreatZoneArray: node.on_zones, m.TaskEvent: node.on_event,
-            SubmitTasks.Request: lambda msg: node.on_submit(msg, SubmitTasks.Response()),
-            SetAvailability.Request: lambda msg: node.on_availability(
+            SubmitTasks.Request: lambda msg: node.requests.submit_tasks(
+                msg, SubmitTasks.Response()),
+            SetAvailability.Request: lambda msg: node.requests.set_availability(
                 msg, SetAvailability.Response())}
 
 
@@ -175,12 +176,13 @@ def test_a_node_that_receives_hostile_messages_plans_all_valid_tasks(node, numbe
 
 def test_a_node_whose_callbacks_always_take_long_does_step(node, monkeypatch):
     node, steps = node[0], []
+    pacing = node.pacing
     monkeypatch.setattr(node, 'leads', lambda: True)
     monkeypatch.setattr(node, 'waits_for_subscribers', lambda _: False)
     monkeypatch.setattr(node.core, 'tick', lambda *_: steps.append(1))
     for _ in range(4):
-        for name in ('stepped_at', 'reads_until', 'pause_until'):  # 2 s pass
-            setattr(node, name, getattr(node, name) - 2.0)
+        for name in ('_ticked_at', '_reads_until', '_pause_until'):  # 2 s pass
+            setattr(pacing, name, getattr(pacing, name) - 2.0)
         node.on_step()
     assert len(steps) == 2
 

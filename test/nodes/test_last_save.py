@@ -17,7 +17,8 @@ def test_a_task_accepted_while_the_disk_failed_is_saved_at_the_end(domain, tmp_p
     database = node.persistence._journal._db
     database.execute('PRAGMA query_only = ON')
     announced = m.TaskAnnouncement(tasks=[m.Task(task_id='t1', value=1.0)])
-    response = node.on_submit(SubmitTasks.Request(announcement=announced), SubmitTasks.Response())
+    response = node.requests.submit_tasks(SubmitTasks.Request(announcement=announced),
+                                          SubmitTasks.Response())
     assert response.accepted == ['t1']
     node.persistence._retry += 1000.0  # it is not tried again in time
     database.execute('PRAGMA query_only = OFF')

@@ -4,25 +4,18 @@ from __future__ import annotations
 
 import gc
 import time
-from collections import deque
-from collections.abc import Callable
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
-from std_srvs.srv import Trigger
 from uav_task_alloc_msgs import msg as m
-from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 
 from uav_task_alloc.allocator import Allocator
 from uav_task_alloc.allocator.leader import Role
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import LogNote, TaskVerdict
-from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
-from uav_task_alloc.allocator.replanning import planning
-from uav_task_alloc.allocator.replanning.worker import Worker
 from uav_task_alloc.allocator.state.ground import read_ground
 from uav_task_alloc.errors import InvalidValue, counted
 from uav_task_alloc.geometry.fence_area import area_corners
@@ -38,6 +31,7 @@ from uav_task_alloc.nodes.conversions.messages import (
 )
 from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
 from uav_task_alloc.nodes.ros.allocator_diagnostics import AllocatorDiagnostics
+from uav_task_alloc.nodes.ros.allocator_services import AllocatorServices
 from uav_task_alloc.nodes.ros.batched_subscription import subscribe_batched
 from uav_task_alloc.nodes.ros.clock_watch import is_simulated
 from uav_task_alloc.nodes.ros.leader_election import LeaderElection
@@ -47,6 +41,8 @@ from uav_task_alloc.nodes.ros.origin_check import OriginCheck
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.refusal_log import RefusalLog
 from uav_task_alloc.nodes.ros.run import run
+from uav_task_alloc.nodes.ros.solver_thread import SolverThread
+from uav_task_alloc.nodes.ros.step_pacing import StepPacing
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
@@ -56,9 +52,6 @@ from uav_task_alloc.zone_codec import decode_zone_array, refused_text
 _STEP_PERIOD = 0.025  # [s]
 _LOCK_TIMEOUT = 5.0  # [s] for the journal of an allocator that is exiting
 _SUBSCRIBER_TIMEOUT = 1.0  # [s] that the lists of the previous run wait for subscribers
-_BLOCKED, _READS = 1.0, 0.5  # [s] without a step; in which it then reads what has come, once
-# a step is followed by a pause, in which messages are taken: a multiple of its duration
-_PAUSE_FACTOR, _LONGEST_PAUSE = 3.0, 0.2  # and at most [s]
 _MOST_LINES, _MOST_ROWS = 200, 500  # logged, and saved, per step
 
 
@@ -98,18 +91,14 @@ class AllocatorNode(Node):
                                        _LOCK_TIMEOUT)
         self.core = Allocator(params, time.monotonic(), self.persistence.saved, terrain)
         self.world = self.core.world
-        self.results: deque[ReplanAnswer | None] = deque()  # of the worker
-        self.background = False  # the running solve is one between events
-        self.pause_until = 0.0  # [s] steady clock
-        self.stepped_at = self.reads_until = time.monotonic()
+        self.solver = SolverThread(self, lambda: self.live.now, self.on_results)
+        self.pacing = StepPacing(time.monotonic())
         self.pending = False  # something is not yet saved or published
         self.passive = False  # another allocator leads
         self.election = LeaderElection(self, self.world.lists, self.persistence.in_use)
         self._create_topics()
-        self.result_ready = self.create_guard_condition(self.on_results)
         self.subscribers_by = time.monotonic() + _SUBSCRIBER_TIMEOUT
-        self.worker = Worker(self.load_solver, self.solve, self.deliver, self.on_solver_error)
-        self.worker.start()
+        self.solver.start()
 
     def _create_topics(self) -> None:
         self.publisher = AllocationPublisher(self, self.world)
@@ -118,8 +107,10 @@ class AllocatorNode(Node):
             self.live.now.fence_area, self.origin))
         self.orders = OrderServices(self, self.core, self.save, self.stamp,
                                     self.origins.conflict)
+        self.requests = AllocatorServices(self, self.world, self.on_tasks, self.save,
+                                          self.origins.conflict)
         self.diagnostics = AllocatorDiagnostics(self, self.core, self.persistence, self.origins,
-                                                self.election)
+                                                self.election, self.solver)
         self.inputs: list[Subscription[Any]] = [
             subscribe_batched(self, m.UavState, 'uav_states', self.on_state, INPUT_STATES),
             subscribe_batched(self, m.TaskAnnouncement, 'task_announcements', self.on_tasks,
@@ -137,12 +128,7 @@ class AllocatorNode(Node):
         """Whether this allocator may publish; it offers its services from then on."""
         role = self.election.role()
         if role is Role.LEADING and not self.offered:
-            self.offered = [
-                self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit),
-                self.create_service(Trigger, '~/replan', self.on_replan),
-                self.create_service(Trigger, '~/forget_demand', self.on_forget_demand),
-                self.create_service(SetAvailability, '~/set_availability', self.on_availability),
-                *self.orders.offer()]
+            self.offered = [*self.requests.offer(), *self.orders.offer()]
         if role is Role.PASSIVE and not self.passive:
             self.step_down()
         return role is Role.LEADING
@@ -160,7 +146,7 @@ class AllocatorNode(Node):
         self.orders.close()
         self.markers.close()
 
-    # topics and services
+    # topics
 
     def on_state(self, msg: m.UavState) -> None:
         """Take the state of a UAV."""
@@ -204,89 +190,29 @@ class AllocatorNode(Node):
         self.refusals.report('task_events', msg.task_id, refusal)
         self.save()
 
-    def on_submit(self, request: SubmitTasks.Request,
-                  response: SubmitTasks.Response) -> SubmitTasks.Response:
-        """Take an announcement; it is saved before the response."""
-        verdicts = self.on_tasks(request.announcement)
-        self.save()
-        return announcements.from_verdicts(verdicts, response)
-
-    def on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Plan again without a change."""
-        self.world.request_replan('replan service', time.monotonic())
-        conflict = self.origins.conflict()
-        response.success = not conflict
-        response.message = (f'nothing is planned: {conflict}' if conflict
-                            else 'a new plan follows on `allocation`')
-        return response
-
-    def on_forget_demand(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Forget where tasks were announced."""
-        count = self.world.announced.seen.forget()
-        self.save()
-        response.success, response.message = True, f'{counted(count, "announcement")} forgotten'
-        return response
-
-    def on_availability(self, request: SetAvailability.Request,
-                        response: SetAvailability.Response) -> SetAvailability.Response:
-        """Set whether a UAV may be given tasks; persists until it is changed."""
-        refusal = self.world.set_available(request.uav_id, request.available, time.monotonic())
-        self.save()
-        state = 'available' if request.available else 'not available'
-        response.success = not refusal
-        response.message = refusal or f'{request.uav_id} is {state}'
-        return response
-
-    # the solver, in the worker's thread
-
-    def load_solver(self) -> None:
-        """Import the compiler and load all compiled kernels."""
-        from uav_task_alloc.allocator.warm_up import compile_kernels
-        from uav_task_alloc.solver.solve import plan
-        compile_kernels(plan, self.live.now)
-
-    def solve(self, problem: ReplanProblem, stop: Callable[[], bool]) -> ReplanAnswer:
-        """Solve a problem; `stop()` is true once the solve should end early."""
-        from uav_task_alloc.solver.solve import plan
-        return planning.solve_problem(plan, problem, self.live.now, stop)
-
-    def deliver(self, result: ReplanAnswer | None) -> None:
-        """Pass a result to the node's thread; None: the solver is loaded, or has failed."""
-        self.results.append(result)
-        self.result_ready.trigger()
-
-    def on_solver_error(self, error: Exception) -> None:
-        """Log why a solve has failed."""
-        text = f'{type(error).__name__}: {error}'[:500]
-        self.diagnostics.solver_error = text
-        self.get_logger().error(f'solver: {text}', throttle_duration_sec=10.0)
-
     # steps
 
     def on_step(self) -> None:
         """Let time pass, start a solve where one is due, and publish changes."""
         now, stamp = time.monotonic(), self.stamp()
-        stepped_at, self.stepped_at = self.stepped_at, now
-        if now - stepped_at > _BLOCKED and stepped_at >= self.reads_until:  # reports wait
-            self.pause_until = self.reads_until = now + _READS
-        if not self.leads() or now < self.pause_until or self.waits_for_subscribers(now):
+        due = self.pacing.is_due(now)
+        if not self.leads() or not due or self.waits_for_subscribers(now):
             return
         self.world.set_params(self.live.now, now)
         self.core.tick(now, stamp)
         self.start_solve(now, stamp)
         self.publish(stamp)
-        self.pause_after(now)
+        self.pacing.pause_after(now, time.monotonic())
 
     def start_solve(self, now: float, stamp: float) -> None:
-        """Give the worker a problem that is due, or end a background solve for it."""
+        """Give the solver a problem that is due, or end a background solve for it."""
         # not before the last result is published: under load that would never complete
         blocked = self.pending or self.origins.conflict()
         problem = None if blocked else self.core.due(now, stamp)
         if problem is not None:
-            self.background = problem.background
-            self.worker.submit(problem)
-        elif self.core.stop_early(now, self.background):
-            self.worker.stop_early()
+            self.solver.submit(problem)
+        elif self.core.stop_early(now, self.solver.background):
+            self.solver.stop_early()
 
     def waits_for_subscribers(self, now: float) -> bool:
         """Whether the lists of the previous run still wait for subscribers.
@@ -298,27 +224,19 @@ class AllocatorNode(Node):
         self.subscribers_by = now
         return False
 
-    def pause_after(self, started: float) -> None:
-        """Leave time for messages after work that began at `started` [s]."""
-        now = time.monotonic()
-        self.pause_until = now + min(_PAUSE_FACTOR * (now - started), _LONGEST_PAUSE)
-
     def on_results(self) -> None:
-        """Adopt the worker's results; the first one means that the solver is loaded."""
+        """Adopt the solver's results; the first one means that the solver is loaded."""
         started = time.monotonic()
-        while self.results:
-            result = self.results.popleft()
+        for result in self.solver.results():
             if not self.world.kernels_ready:
                 self.core.set_kernels_ready()
                 gc.freeze()  # collections need not traverse the compiler's objects
                 self.get_logger().info('ready')
                 continue
-            if result is not None:
-                self.diagnostics.solver_error = ''
             self.core.adopt(result, time.monotonic(), self.stamp())
         if self.leads():
             self.publish(self.stamp())
-        self.pause_after(started)
+        self.pacing.pause_after(started, time.monotonic())
 
     def publish(self, stamp: float) -> None:
         """Save changes, then publish them; only holds while the origins of nodes differ.
@@ -360,8 +278,8 @@ class AllocatorNode(Node):
         return self.get_clock().now().nanoseconds * 1e-9
 
     def destroy_node(self) -> None:
-        """End the worker, save, and release the journal."""
-        self.worker.close()
+        """End the solver, save, and release the journal."""
+        self.solver.close()
         self.orders.close()
         self.persistence.save_last(self.core)
         self.persistence.close()

@@ -15,6 +15,7 @@ from uav_task_alloc.nodes.conversions.messages import INPUT_ANNOUNCEMENTS, INPUT
 from uav_task_alloc.nodes.ros.clock_watch import ClockOffsets, watch_clock
 from uav_task_alloc.nodes.ros.leader_election import LeaderElection
 from uav_task_alloc.nodes.ros.origin_check import OriginCheck
+from uav_task_alloc.nodes.ros.solver_thread import SolverThread
 from uav_task_alloc.nodes.ros.unheard_publishers import unheard_publishers
 
 _INPUTS = {'task_announcements': INPUT_ANNOUNCEMENTS, 'threat_zones': LATCHED,
@@ -30,22 +31,22 @@ class AllocatorDiagnostics:
         persistence: its journal.
         origins: of the nodes of the fleet.
         election: which allocator leads.
+        solver: whose error is reported.
 
     Attributes:
         offsets: of the clocks of those who report.
         refused_zones: which zones of the last message were refused, and why; '' for none.
-        solver_error: of the last solve; '' for none.
     """
 
     def __init__(self, node: Node, core: Allocator, persistence: Persistence,
-                 origins: OriginCheck, election: LeaderElection) -> None:
+                 origins: OriginCheck, election: LeaderElection, solver: SolverThread) -> None:
         self._node, self._core, self._persistence = node, core, persistence
-        self._origins, self._election = origins, election
+        self._origins, self._election, self._solver = origins, election, solver
         self._clock = watch_clock(node, node.get_logger().warning)
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._logged_conflict = ''  # of origins
         self.offsets = ClockOffsets('reports')
-        self.refused_zones = self.solver_error = ''
+        self.refused_zones = ''
 
     def publish(self, stamp: float) -> None:
         """Publish warnings and figures, and log where the origins of nodes begin to differ.
@@ -70,7 +71,7 @@ class AllocatorDiagnostics:
         now, sources = time.monotonic(), self._node.count_publishers('threat_zones')
         several = (f'threat_zones has {sources} publishers: expected one, as each message '
                    'replaces all zones') if sources > 1 else ''
-        return [*health_warnings(self._core.world, self._persistence.error, self.solver_error,
+        return [*health_warnings(self._core.world, self._persistence.error, self._solver.error,
                                  stamp),
                 *filter(None, (self._clock.warning(now), self.offsets.warning(now),
                                self.refused_zones)),
