@@ -17,12 +17,14 @@ from uav_task_alloc.allocator.plan_publisher import PlanPublisher
 from uav_task_alloc.allocator.records import Outbox, SavedState
 from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning.accepted_lists import accepted_lists, plan_of_lists
+from uav_task_alloc.allocator.replanning.approvals import Approvals
 from uav_task_alloc.allocator.replanning.battery_changes import BatteryChanges
 from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
+from uav_task_alloc.allocator.replanning.lists_to_publish import holding_plan
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
 from uav_task_alloc.allocator.replanning.planning import replan_problem
-from uav_task_alloc.allocator.replanning.proposal import Approvals, holding_plan, split_plan
+from uav_task_alloc.allocator.replanning.proposal import split_plan
 from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
 from uav_task_alloc.allocator.replanning.waiting_places import WaitingPlaces

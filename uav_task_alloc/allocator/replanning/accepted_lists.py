@@ -10,6 +10,7 @@ from uav_task_alloc.allocator.list_records import LaterTrips, UavList
 from uav_task_alloc.allocator.records import Proposal
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
+from uav_task_alloc.allocator.replanning.lists_to_publish import lists_apart
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav
 from uav_task_alloc.allocator.replanning.planning import (
     BuiltLists,
@@ -18,6 +19,7 @@ from uav_task_alloc.allocator.replanning.planning import (
     build_list,
 )
 from uav_task_alloc.allocator.replanning.task_lists import legs_of_list
+from uav_task_alloc.allocator.replanning.trips import remaining_trips
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan
 
@@ -109,17 +111,8 @@ def _later_trips_then(world: World, proposal: Proposal, routes: TaskIdsByUav) ->
     """The later trips with a proposal, less the tasks that are in lists."""
     every = {**{uav_id: each.task_ids for uav_id, each in world.lists_in_force().items()},
              **routes}
-    planned, later = {*chain(*every.values())}, LaterTrips()
     others = {uav_id: trips for uav_id, trips in world.later.items() if uav_id not in routes}
-    for uav_id, trips in (proposal.later | others).items():
-        if world.uav_record(uav_id) is None:
-            continue
-        rows = [tuple(name for name in trip if name not in planned
-                      and world.can_fly(uav_id, name)) for trip in trips]
-        planned.update(chain(*rows))
-        if any(rows):
-            later[uav_id] = tuple(filter(None, rows))
-    return later
+    return remaining_trips(world, proposal.later | others, chain(*every.values()))
 
 
 def _build_accepted(world: World, built: BuiltLists, each: UavList, task_ids: tuple[str, ...],
@@ -142,10 +135,7 @@ def _apart_from_others(world: World, built: BuiltLists, stamp: float) -> BuiltLi
     """The lists, and those of other UAVs that have to change to be apart from them."""
     if not separation_of(world.params).on:
         return built
-    from uav_task_alloc.allocator.replanning.separated_lists import (  # imports numba
-        with_separation,
-    )
     every = {**world.lists_in_force(), **built.lists}
-    apart = with_separation(world, replace(built, lists=every), stamp)
+    apart = lists_apart(world, replace(built, lists=every), stamp)
     return replace(apart, lists={uav_id: each for uav_id, each in apart.lists.items()
                                  if uav_id in built.lists or each is not every[uav_id]})

@@ -7,8 +7,9 @@ changed, has later trips only.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
+from itertools import chain
 
 from uav_task_alloc.allocator.list_records import LaterTrips
 from uav_task_alloc.allocator.state.flights import OVERDUE
@@ -62,6 +63,29 @@ def with_later_trips(published: Plan, world: World) -> Plan:
         trips[uav_id] = row if begins else (present, *row)
     state = published.state and replace(published.state, trips=trips)
     return replace(published, routes=routes, state=state)
+
+
+def remaining_trips(world: World, later: LaterTrips, planned: Iterable[str]) -> LaterTrips:
+    """Return the later trips without the tasks that are planned already; none is planned twice.
+
+    Args:
+        world: as it is now.
+        later: trips of UAVs, known or not; those of the first ones come first.
+        planned: ids of tasks in lists.
+
+    Returns:
+        Trips of known UAVs, with tasks that are open and that they may fly.
+    """
+    taken, found = set(planned), LaterTrips()
+    for uav_id, trips in later.items():
+        if world.uav_record(uav_id) is None:
+            continue
+        rows = [tuple(task_id for task_id in trip if task_id not in taken
+                      and world.can_fly(uav_id, task_id)) for trip in trips]
+        taken.update(chain(*rows))
+        if any(rows):
+            found[uav_id] = tuple(filter(None, rows))
+    return found
 
 
 def waiting_uavs(world: World, stamp: float) -> dict[str, Uav]:

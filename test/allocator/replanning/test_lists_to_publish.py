@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The lists of a plan that may be published, and the plan that breaks no accepted deadline."""
+from dataclasses import replace
+
+import pytest
+from allocation import AllocatorDriver
+
+from uav_task_alloc.allocator.replanning.lists_to_publish import (
+    holding_plan,
+    lists_apart,
+    lists_to_publish,
+)
+from uav_task_alloc.allocator.replanning.planning import BuiltLists
+from uav_task_alloc.model import Plan, Task
+
+KEEPS, BREAKS = Plan({'a': ('due', 'far')}), Plan({'a': ('far', 'due')})
+
+
+@pytest.fixture
+def driver():
+    """UAV a flies `due`, whose deadline it keeps only if it does so first."""
+    driver = AllocatorDriver(default_cruise_speed=10.0)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(Task('due', (100.0, 0.0, 50.0), latest=driver.now + 60.0))
+    driver.settle()
+    driver.add(Task('far', (-2000.0, 0.0, 50.0)))
+    assert driver.route('a') == ('due',)
+    return driver
+
+
+def test_lists_of_a_plan_that_keeps_the_deadline_are_published(driver):
+    built = lists_to_publish(driver.world, KEEPS, driver.now)
+    assert built.lists['a'].task_ids == ('due', 'far')
+    assert built.left_out == {}
+
+
+def test_a_list_that_breaks_the_deadline_is_held_back_and_what_it_adds_is_left_out(driver):
+    built = lists_to_publish(driver.world, BREAKS, driver.now)
+    assert built.lists['a'] is driver.world.list_of('a')
+    assert built.left_out == {
+        'far': 'left out: it would break the deadline of due that is accepted'}
+
+
+def test_the_first_plan_that_holds_the_deadlines_is_chosen(driver):
+    other = replace(KEEPS, iterations=7)
+    assert holding_plan(driver.world, (BREAKS, other, KEEPS), driver.now) is other
+    assert holding_plan(driver.world, (BREAKS,), driver.now) is BREAKS
+
+
+def test_without_separation_lists_stay_as_they_are(driver):
+    built = BuiltLists(dict(driver.world.lists_in_force()))
+    assert lists_apart(driver.world, built, driver.now) is built
