@@ -29,6 +29,7 @@ from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
 from uav_task_alloc.allocator.replanning.waiting_places import WaitingPlaces
 from uav_task_alloc.allocator.separation_watch import SeparationWatch
+from uav_task_alloc.allocator.state.ended_tasks import EndedTasks
 from uav_task_alloc.allocator.state.list_updates import ListUpdates
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.world import World
@@ -76,6 +77,7 @@ class Allocator:
         self.approvals = Approvals(self.world)
         self.separation = SeparationWatch(self.world)
         self._list_updates = ListUpdates(self.world.tasks, self.world.lists, self.world.flights)
+        self._ended = EndedTasks(self.world.tasks, self.world.works, self.world.lists)
         self.batteries = BatteryWatch(self.world)
         self.waiting = WaitingPlaces(self.world)
         self._changes = BatteryChanges(self.world, self.waiting)
@@ -119,7 +121,7 @@ class Allocator:
         self._check_approval(now, stamp)
         if self._publisher.due(now):
             world.request_replan('deferred lists', now)
-        world.forget_ended()
+        self._ended.forget_oldest(world.params.keep_ended)
         self._wait_for_tasks(now, stamp)
         self._publisher.predict(now, stamp)
         if world.outbox.statuses:

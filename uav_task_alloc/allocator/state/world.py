@@ -87,7 +87,6 @@ class World:
         paths = self.airspace.paths
         self.restart_hold = any(each.stops for each in saved.lists)  # no task changes its UAV
         self.kernels_ready = False  # compiled: checks of zones are fast
-        self._kept = -1, -1  # `keep_ended`, and how many had ended when it was applied
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
         self.stuck: frozenset[str] = frozenset()  # UAVs that wait for one that waits for them
@@ -241,16 +240,6 @@ class World:
         self.validity.forget(uav_id)
         self.flights.forget(uav_id)
         self.jumps.forget(uav_id)
-
-    def forget_ended(self) -> None:
-        """Remove ended tasks beyond `keep_ended`."""
-        keep, count = self.params.keep_ended, len(self.tasks.ended)
-        if count > keep and (keep, count) != self._kept:
-            listed = self.lists.owners()
-            gone = self.works.forget_ended(keep, listed)
-            self.lists.forget_tasks(gone | self.tasks.forget_ended(
-                keep, {*listed, *self.works.all_pieces()}))
-            self._kept = keep, len(self.tasks.ended)
 
     # questions of the planner
 
