@@ -34,6 +34,7 @@ class TaskRegistry:
         task: as announced.
         task_id, task_ids: as announced, or of pieces.
         stamp: [s] clock of the node.
+        uav: id of a UAV.
     """
 
     def __init__(self, records: Iterable[TaskRecord] = ()) -> None:
@@ -57,6 +58,11 @@ class TaskRegistry:
         return f'{task_id} is {record.state.name}' if record.state in (
             TaskState.COMPLETED, TaskState.CANCELLED) else ''
 
+    @property
+    def open_count(self) -> int:
+        """How many tasks are still to be done; O(1)."""
+        return len(self.records) - len(self.ended)
+
     def open(self) -> list[TaskRecord]:
         """Return the tasks still to be done."""
         return [record for record in self.records.values() if record.open]
@@ -64,7 +70,7 @@ class TaskRegistry:
     def add(self, task: Task, stamp: float) -> TaskVerdict:
         """Accept a new task; a replay changes nothing, another task with a known id is refused."""
         known = self.records.get(task.id)
-        if known is None and len(self.records) - len(self.ended) >= MAX_OPEN:
+        if known is None and self.open_count >= MAX_OPEN:
             return self.reject(task.id, f'open tasks = {MAX_OPEN}: expected fewer', stamp)
         if known is None:
             rule = rule_for(TaskState.REJECTED, TaskTransition.ADD)
@@ -76,6 +82,11 @@ class TaskRegistry:
             return TaskVerdict(task.id, True, UNCHANGED + ended)
         return TaskVerdict(task.id, False,
                        f'duplicate id: another task was announced under it{ended}')
+
+    def add_completed(self, task: Task, uav: str, stamp: float) -> None:
+        """Record a new task that is completed already, by that UAV; also where no more is open."""
+        self._put(TaskRecord(task, task, stamp=stamp, since=stamp))
+        self.step(task.id, TaskTransition.COMPLETE, stamp, uav)
 
     def update(self, task: Task, stamp: float) -> TaskVerdict:
         """Replace the content of an open task, or of a failed one, which is tried again."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from uav_task_alloc.allocator.records import TaskRecord, TaskState, TaskVerdict
 from uav_task_alloc.allocator.state.flown_strips import pieces_around_flown
-from uav_task_alloc.allocator.state.matched_pieces import match_pieces
+from uav_task_alloc.allocator.state.matched_pieces import MatchedPiece, match_pieces
 from uav_task_alloc.allocator.state.task_state_machine import TaskTransition
 from uav_task_alloc.allocator.state.tasks import MAX_OPEN, UNCHANGED, TaskRegistry
 from uav_task_alloc.allocator.state.work_state import record_of_whole, state_of_pieces
@@ -74,8 +74,8 @@ class Works:
         except _NO_CUT as error:
             return self._tasks.reject(work.task.id, str(error), stamp)
         whys = [self._refusal(piece, stamp) for piece in pieces]
-        if len(self._tasks.open()) + len(pieces) > MAX_OPEN:
-            whys = [f'open tasks and pieces: expected at most {MAX_OPEN}']
+        if self._tasks.open_count + len(pieces) > MAX_OPEN:
+            whys = [_no_room()]
         if all(whys):
             return self._tasks.reject(work.task.id, whys[0], stamp)
         self._tasks.rejected.pop(work.task.id, None)
@@ -118,7 +118,10 @@ class Works:
         whys = [self._refusal(piece, stamp) for piece in pieces]
         if whys and all(whys):
             return TaskVerdict(known.id, False, whys[0])
-        self._recut(new, pieces, stamp, 'changed', renew=True)
+        matched = self._matched(new, pieces)
+        if not self._has_room(new, matched):
+            return TaskVerdict(known.id, False, _no_room())
+        self._recut(new, matched, stamp, 'changed', renew=True)
         return TaskVerdict(known.id, True)
 
     def cancel(self, task_id: str, stamp: float) -> TaskVerdict:
@@ -159,7 +162,8 @@ class Works:
             pieces = self._cut_rest(known)
         except _NO_CUT:
             return False  # too many pieces with these zones, or no terrain: it stays as it is
-        return self._recut(known, pieces, stamp, why)
+        matched = self._matched(known, pieces)
+        return self._has_room(known, matched) and self._recut(known, matched, stamp, why)
 
     def _cut_rest(self, known: WorkRecord) -> Sequence[Task]:
         """Cut work as it was cut before; raises as the cut does."""
@@ -179,16 +183,33 @@ class Works:
             return work
         return replace(work, direction=main_direction(paths))
 
-    def _recut(self, known: WorkRecord, pieces: Sequence[Task], stamp: float, why: str,
-               renew: bool = False) -> bool:
-        """Take over a new cut: equal pieces keep their ids, and what is flown is left out."""
-        present = {record.task.id: record for record in self._present(known)}
-        unflown = [record for record in present.values()
+    def _matched(self, known: WorkRecord, pieces: Sequence[Task]) -> list[MatchedPiece]:
+        """The pieces of a new cut against those in force."""
+        unflown = [record for record in self._present(known)
                    if record.state is not TaskState.COMPLETED]
         # flown strips that were narrower count for what they have covered only
         wide = [record for record in self._flown(known) if not _is_narrow(known, record.task.id)]
-        kept, last, changed = list[str](), known.last, False
-        for found in match_pieces(pieces, unflown, wide):
+        return match_pieces(pieces, unflown, wide)
+
+    def _has_room(self, known: WorkRecord, matched: Sequence[MatchedPiece]) -> bool:
+        """Whether the new pieces of a cut may be open beside all other tasks."""
+        if all(found.known for found in matched):
+            return True
+        others = self._tasks.open_count - sum(record.open for record in self._present(known))
+        return others + sum(not found.flown for found in matched) <= MAX_OPEN
+
+    def _recut(self, known: WorkRecord, matched: Sequence[MatchedPiece], stamp: float, why: str,
+               renew: bool = False) -> bool:
+        """Take over a new cut: equal pieces keep their ids, and what is flown is left out."""
+        present = {record.task.id: record for record in self._present(known)}
+        stay = {found.known for found in matched}
+        ended = [each for each in known.pieces if each in present and each not in stay
+                 and present[each].state is TaskState.COMPLETED]
+        gone = [each for each in present if each not in stay and each not in ended]
+        for each in gone:  # first, as they make room for the others
+            self._tasks.step(each, TaskTransition.REPLACE, stamp, why=why)
+        kept, last, changed = list[str](), known.last, bool(gone)
+        for found in matched:
             task_id = found.known
             if not task_id:
                 last, changed = last + 1, True
@@ -197,13 +218,8 @@ class Works:
             elif renew and not found.flown:
                 changed |= self._renew(present[task_id], found.task, stamp)
             kept.append(task_id)
-        ended = [each for each in known.pieces if each in present and each not in kept
-                and present[each].state is TaskState.COMPLETED]
-        gone = [each for each in present if each not in kept and each not in ended]
-        for each in gone:
-            self._tasks.step(each, TaskTransition.REPLACE, stamp, why=why)
         self._put(replace(known, pieces=(*ended, *kept), last=last))
-        return changed or bool(gone)
+        return changed
 
     def _renew(self, record: TaskRecord, part: Task, stamp: float) -> bool:
         """Give a piece the content of a new cut; its way stays as it was."""
@@ -240,8 +256,7 @@ class Works:
                 record.task.path for record in self._flown(known)).unflown_parts(task.path):
             return False
         is_open, last = self.is_open(known.id), known.last + 1
-        self._tasks.add(replace(task, id=piece_id(known.id, last)), stamp)
-        self._tasks.step(piece_id(known.id, last), TaskTransition.COMPLETE, stamp, uav_id)
+        self._tasks.add_completed(replace(task, id=piece_id(known.id, last)), uav_id, stamp)
         known = replace(known, pieces=(*known.pieces, piece_id(known.id, last)), last=last)
         self._put(known)
         if is_open:
@@ -309,6 +324,10 @@ class Works:
     def _put(self, record: WorkRecord) -> None:
         self.records[record.id] = record
         self.unsaved.add(record.id)
+
+
+def _no_room() -> str:
+    return f'open tasks and pieces: expected at most {MAX_OPEN}'
 
 
 def _is_narrow(known: WorkRecord, task_id: str) -> bool:
