@@ -45,9 +45,7 @@ class MissionEvidence:
 
     def returning(self) -> bool:
         """Whether the item that returns or lands is next, is being flown, or is flown."""
-        progress = self._onboard.progress
-        return progress.returns and progress.current is not None and (
-            progress.current > progress.last_flown)
+        return self._onboard.progress.returning
 
     def returned_before(self, now: float, since: float) -> bool:
         """Whether the mission that was just replaced had come to its return.
@@ -115,7 +113,7 @@ class MissionEvidence:
             return None, None, False
         if self._checksum is None or self._checksum[0] is not held:
             self._checksum = held, checksum(held)
-        passed, current = progress.passed_in_order, progress.current
+        passed, current = progress.passed.in_order(), progress.current
         if passed:  # credited by a restarted bridge
             current = next((n for n, item in enumerate(held[:current]) if item.task in passed),
                            current)
@@ -127,7 +125,7 @@ class MissionEvidence:
         tasks, left = progress.passed_in_flight
         if not tasks or progress.current is None:
             return ()
-        seen = {item.task for item in progress.seen_passed()}
+        seen = {item.task for item in progress.passed.seen()}
         held = [(n, item) for n, item in enumerate(progress.items[:progress.current])
                 if item.task in tasks]
         return () if not held else (held[0][0], held[-1][0] + 1, left, *(
@@ -147,7 +145,7 @@ class MissionEvidence:
         Args:
             current: of `mission_position`; None: it is not known.
         """
-        held, seen = self._onboard.progress.items, self._onboard.progress.seen_passed()
+        held, seen = self._onboard.progress.items, self._onboard.progress.passed.seen()
         if current is not None and (self._ahead[0] is not held or self._ahead[1] != current):
             marks = [TaskMark(item.task, *item.position, 0.0, False) for item in held[current:]
                      if item.completes and item.position is not None]

@@ -61,6 +61,30 @@ class Epoch:
         """Whether the last item with a position is being flown, or is passed."""
         return bool(self.items) and self.current is not None and self.current >= self.last_flown
 
+    def replace(self, items: tuple[Item, ...], current: int | None, begin: float,
+                taken: float = -math.inf, taken_frame: float = math.inf) -> None:
+        """Begin the next epoch.
+
+        Args:
+            items: on board, without home.
+            current: index of the one being flown; None: not known.
+            begin: vehicle time [s] from which it may be flown.
+            taken: vehicle time [s] before which the items were not on board; -inf: not known.
+            taken_frame: number of the last frame before that; inf: not known.
+        """
+        self.number, self.items, self.current = self.number + 1, items, current
+        self.since = self.begin = begin
+        self.taken, self.taken_frame = taken, taken_frame
+
+    def correct(self, items: tuple[Item, ...], current: int) -> None:
+        """Begin the next epoch, with other items at the times of this one."""
+        self.number, self.items, self.current = self.number + 1, items, current
+        self.since = self.begin
+
+    def extend(self, items: tuple[Item, ...]) -> None:
+        """Begin the next epoch, whose first items are those of this one, as they are flown on."""
+        self.number, self.items = self.number + 1, items
+
     def invalidate(self) -> None:
         """Forget the items: the mission on board is unknown."""
         self.items, self.current, self.started = (), None, None

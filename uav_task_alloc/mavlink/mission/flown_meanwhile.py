@@ -70,7 +70,7 @@ def next_after_unset(progress: ProgressTable, before: int, seq: int, now: float,
     items = progress.items
     if not before < seq <= len(items):
         return otherwise
-    if progress.was_at_by(items[before], now):
+    if progress.evidence.was_at(items[before], now):
         progress.credit(items[before])
     return next((n for n, item in enumerate(items)
                  if item.task and item.task not in progress.completed), otherwise)

@@ -23,6 +23,7 @@ from uav_task_alloc.mavlink.mission.position_history import PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import REPEAT_WINDOW, PreviousEpoch, ReachedEpoch
 from uav_task_alloc.mavlink.mission.reached_items import ReachedItems
 from uav_task_alloc.mavlink.mission.reached_series import ReachedSeries
+from uav_task_alloc.mavlink.mission.report_evidence import ReportEvidence
 from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point, Task
@@ -53,6 +54,8 @@ class ProgressTable:
     Attributes:
         completed: the completed tasks of all epochs in order, and where each was [m] ENU.
         events: tasks that started or completed; this and the next are taken by the caller.
+        evidence: whether a report can be of a mission, by the positions.
+        passed: the items that were passed and may be completed still.
         skipped: tasks skipped by another station.
         passed_over: items passed and not known to be flown.
         uncovered: tasks whose way was not flown as a whole.
@@ -76,8 +79,10 @@ class ProgressTable:
             plane)
         self.end_before_restart = EndBeforeRestart(
             self._epoch, self._tasks, self.positions, self._moves)
+        self.evidence = ReportEvidence(
+            self._epoch, self.positions, self._mode, self._epochs.series)
         self.path, self.previous_returned = self.positions.path, self._epochs.has_returned
-        self.reports = self._moves.reports
+        self.reports, self.passed = self._moves.reports, self._moves.passed
         self.completed: dict[str, Point | None] = self._tasks.places
         self.events: deque[ProgressEvent] = self._tasks.events
         self.skipped: deque[str] = self._moves.skipped
@@ -120,6 +125,11 @@ class ProgressTable:
         return self._epoch.returns
 
     @property
+    def returning(self) -> bool:
+        """Whether the item that returns or lands is next, is being flown, or is flown."""
+        return self._epoch.returning
+
+    @property
     def set_by_other(self) -> int | None:
         """The current item, where another station has set it."""
         return self._moves.set_by_other
@@ -132,7 +142,7 @@ class ProgressTable:
     @property
     def pending(self) -> frozenset[str]:
         """Tasks that may be completed: the evidence may still arrive."""
-        claims, doubtful = self._moves.passed.claims, self._tasks.doubtful
+        claims, doubtful = self.passed.claims, self._tasks.doubtful
         return frozenset(chain((i.task for claim in claims for i in claim.items), doubtful)) if (
             claims or doubtful) else NO_TASKS
 
@@ -142,18 +152,9 @@ class ProgressTable:
         return self.pending.union(self.completed)
 
     @property
-    def passed_in_order(self) -> frozenset[str]:
-        """The pending tasks that were passed one by one, as a mission is flown."""
-        return self._moves.passed.in_order()
-
-    @property
     def passed_in_flight(self) -> tuple[frozenset[str], int]:
         """See `CurrentItem.passed_in_flight`."""
         return self._moves.passed_in_flight()
-
-    def seen_passed(self) -> tuple[Item, ...]:
-        """Return the items of pending tasks at which the vehicle was seen, of any epoch."""
-        return self._moves.passed.seen()
 
     def may_end(self, now: float) -> bool:
         """Whether the mission may be at its end, or was when it was just replaced."""
@@ -177,38 +178,33 @@ class ProgressTable:
                 where they were found on board.
         """
         epoch = self._epoch
-        epoch.number += 1
         if (epoch.items or read) and not all_alike(epoch.items, items):
             self._epochs.begin(PreviousEpoch(
                 epoch.items, epoch.since, self.positions.vehicle_time(now), self.may_end(now),
                 now + REPEAT_WINDOW, epoch.taken, epoch.returning, self.reports.reported))
             self.coverage.note_replaced(
                 items[start] if start is not None and start < len(items) else None)
-        epoch.items, epoch.current = items, start
+        if since is not None:
+            epoch.replace(items, start, since, since, self._frames.newest)
+        else:
+            epoch.replace(items, start, -math.inf if read else self.path.newest)
         self._reached.begin()
         self._moves.begin(None if read or start == len(items) else start, now)
         if read:
             self._moves.reports.note_read(start if since is None and start != len(items) else None)
-        known_since = self.path.newest if since is None else since
-        epoch.since = epoch.begin = -math.inf if read and since is None else known_since
-        epoch.taken = -math.inf if since is None else since
-        epoch.taken_frame = math.inf if since is None else self._frames.newest
         if read and since is None:  # along the way that a mission found on board is on
             self.coverage.continue_at(self.active, self.path.sample)
 
     def correct(self, items: tuple[Item, ...], start: int, now: float) -> None:
         """Replace the items of this epoch: the vehicle has taken other ones than were sent."""
-        epoch = self._epoch
-        self._moves.passed.drop_epoch(epoch.number)
-        epoch.number, epoch.items, epoch.current = epoch.number + 1, items, start
-        epoch.since = epoch.begin
+        self.passed.drop_epoch(self._epoch.number)
+        self._epoch.correct(items, start)
         self._reached.begin()
         self._moves.begin(start, now)
 
     def extend(self, items: tuple[Item, ...]) -> None:
         """Begin a new epoch whose first items are those of the last one; the vehicle flies on."""
-        self._epoch.number += 1
-        self._epoch.items = items
+        self._epoch.extend(items)
 
     def invalidate(self, until: float = math.inf) -> None:
         """End the epoch, known until vehicle time `until` [s]: the mission is not known."""
@@ -239,7 +235,7 @@ class ProgressTable:
     def last_positions(self) -> tuple[PositionSample, ...]:
         """The newest position, after those around a gap since the current item is flown."""
         return self.path.last(min((self._epoch.since, *(
-            claim.since for claim in self._moves.passed.claims))))
+            claim.since for claim in self.passed.claims))))
 
     def has_arrived(self, seq: int) -> bool:
         """Whether the vehicle was within the radius of an item since it is current."""
@@ -299,26 +295,6 @@ class ProgressTable:
         contradicted, self._reached.contradicted = self._reached.contradicted, False
         return contradicted
 
-    def reached_first_at(self, seq: int, now: float, frame: int) -> float:
-        """When [s] the first REACHED was received that this one may repeat, of any epoch.
-
-        Args:
-            seq: index without home.
-            now: steady time [s] at which it was received.
-            frame: its number.
-        """
-        series = self._epochs.series
-        return series.first_at(series.add(seq, now, frame))
-
-    def may_repeat_earlier(self, seq: int, now: float, frame: int) -> bool:
-        """Whether a REACHED may repeat one of before this mission was on board.
-
-        Args:
-            seq, now, frame: see `reached_first_at`.
-        """
-        series = self._epochs.series
-        return series.first_sent(series.add(seq, now, frame)) < self._epoch.taken
-
     def note_end(self, seq: int, now: float) -> None:
         """Note a REACHED of this epoch or the next: the mission may have ended."""
         self._reached.note_end(seq, now)
@@ -366,26 +342,6 @@ class ProgressTable:
         self.completed.pop(task, None)
         self.coverage.forget(task)
         self._epoch.started = None if self._epoch.started == task else self._epoch.started
-
-    def was_at_by(self, item: Item, when: float, since: float = -math.inf) -> bool:
-        """Whether an item was reached before a message received at `when` [s].
-
-        Args:
-            item: of a mission.
-            when: steady time [s].
-            since: vehicle time [s] before which it was not reached.
-        """
-        return self.positions.was_at(
-            item, max(self._epoch.since, since), self.positions.vehicle_time(when))
-
-    def was_exactly_at(self, item: Item, when: float, since: float = -math.inf) -> bool:
-        """Whether it was within the radius of an item in mission mode; see `was_at_by`."""
-        until = min(self.positions.vehicle_time(when), self._mode.left_at)
-        return self.positions.was_at(item, max(self._epoch.since, since), until, close=0.0)
-
-    def near_one(self, item: Item, other: Item | None, when: float) -> bool:
-        """Whether it was near one item, but not another, before a message at `when` [s]."""
-        return self.positions.near_one(item, other, when)
 
     def _note_active(self) -> None:
         self.coverage.note_active(self.active, self._mode.in_mission, self._vehicle_now,

@@ -74,6 +74,7 @@ class ReportsDuringUpload:
 
     def __init__(self, progress: ProgressTable, origin: Origin, atomic: bool) -> None:
         self._progress, self._origin, self._atomic = progress, origin, atomic
+        self._evidence = progress.evidence
         self._reached: list[_Reached] = []
         self._currents: list[_Current] = []
         self._judged: set[tuple[int, int]] = set()  # first and last frame of series credited early
@@ -96,7 +97,7 @@ class ReportsDuringUpload:
 
     def add_reached(self, seq: int, now: float, frame: int) -> None:
         """Keep a REACHED that may be of the old or of the new mission."""
-        self._progress.reached_first_at(seq, now, frame)
+        self._evidence.first_at(seq, now, frame)
         repeated = bool(self._reached) and self._reached[-1].seq == seq  # by PX4
         if repeated:
             self._reached[-1] = self._reached[-1]._replace(last=now, last_frame=frame)
@@ -182,7 +183,7 @@ class ReportsDuringUpload:
 
     def _first_at(self, reached: _Reached) -> float:
         """When [s] the first of its series was received."""
-        return self._progress.reached_first_at(reached.seq, reached.last, reached.last_frame)
+        return self._evidence.first_at(reached.seq, reached.last, reached.last_frame)
 
     def begin_new(self, uploaded: MissionDiff) -> list[tuple[int, float, int]]:
         """Credit the REACHED of the old mission.
@@ -214,7 +215,7 @@ class ReportsDuringUpload:
         """
         seq, frame, last, last_frame, kept_at = reached
         progress, first = self._progress, self._first_at(reached)
-        if first < kept_at or progress.may_repeat_earlier(seq, last, last_frame):
+        if first < kept_at or self._evidence.may_repeat_earlier(seq, last, last_frame):
             return self._credit_repeated(reached, before, after, uploaded)
         if before is not None and self._was_at(before, reached, len(progress.items), -math.inf):
             progress.note_reached(seq, first, proven=True, frame=frame)
@@ -223,12 +224,12 @@ class ReportsDuringUpload:
         elif after is not None and self._was_at(
                 after, reached, len(uploaded.items), self._new_since):
             return first
-        elif before is not None and progress.near_one(before, after, first):
+        elif before is not None and progress.positions.near_one(before, after, first):
             if before.task:
                 progress.credit(before)
             else:  # of a mission that was read: `resume` finds the task by its position
                 progress.note_reached(seq, first, frame=frame)
-        elif after is not None and progress.near_one(after, before, first):
+        elif after is not None and progress.positions.near_one(after, before, first):
             return first
         else:
             return self._credit_repeated(reached, before, after, uploaded)
@@ -250,21 +251,22 @@ class ReportsDuringUpload:
             positions.sent_between(each.frame)[0] for each in self._currents
             if each.flying and each.seq == reached.seq and each.frame < reached.frame),
             default=-math.inf)
-        return self._progress.was_at_by(
+        return self._evidence.was_at(
             item, self._first_at(reached), max(since, reported - item.params[0]))
 
     def _credit_repeated(self, reached: _Reached, before: Item | None, after: Item | None,
                          uploaded: MissionDiff) -> float | None:
         """As `_credit_old`, where only a new one among repetitions of an older one counts."""
-        progress, seq, last = self._progress, reached.seq, reached.last
+        progress, evidence, seq, last = (
+            self._progress, self._evidence, reached.seq, reached.last)
         # a new one makes the next item current; the last item stays
         passed = seq == len(uploaded.items) - 1 or any(
             each.seq > seq and each.frame > reached.frame for each in self._currents)
-        if after is not None and seq == uploaded.start and passed and progress.was_exactly_at(
+        if after is not None and seq == uploaded.start and passed and evidence.was_exactly_at(
                 after, last, self._new_since):
             return last
         if before is not None and seq == progress.current and (
-                progress.was_exactly_at(before, last)):
+                evidence.was_exactly_at(before, last)):
             progress.credit(before)
         return None
 
