@@ -64,7 +64,7 @@ def test_fault_20_reached_during_an_upload_belongs_to_the_old_list(kind):
     first = 1 if kind == 'ardupilot' else 0
     names = 'ABCD' if kind == 'ardupilot' else 'ADCB'
     bench.assign(task_list(names, 2))
-    assert bench.run(lambda: bench.onboard().open, 10.0)
+    assert bench.run(lambda: bench.onboard().latest_upload.is_open, 10.0)
     bench.executor().telemetry.position_at = -100.0
     bench.onboard().progress.positions.place = None
     bench.from_vehicle(d.MAVLink_mission_item_reached_message(first))

@@ -39,7 +39,7 @@ def appended(lost=(), **kwargs):
     lost_until = [bench.now + 6.0]
     bench.assign(task_list('CDEF', 2))
     assert truthful(bench, lambda: happened(bench, 'mission_end'), 30.0)
-    assert bench.onboard().open
+    assert bench.onboard().latest_upload.is_open
     return bench
 
 

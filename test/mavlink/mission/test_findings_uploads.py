@@ -52,7 +52,7 @@ def test_a_task_reached_before_a_mission_that_is_not_confirmed_is_lost_is_known(
     bench.assign(task_list('BCA', 2))
     assert bench.run(lambda: places(bench) == ['B'], 40.0)
     bench.run(limit=after)
-    assert not bench.onboard().taken
+    assert not bench.onboard().latest_upload.taken
     if event == 'kill':
         assert bench.completed() == ['B']
     else:

@@ -122,7 +122,7 @@ def test_a_mission_stored_in_a_hold_is_not_flown_up_to_the_item_of_the_mission_b
         drop_messages(bench, 'up', message, lambda m: m.get_type() == 'MISSION_SET_CURRENT' or (
             m.command == d.MAV_CMD_DO_SET_MISSION_CURRENT))
     bench.assign(task_list('DEF', 2))
-    assert bench.run(lambda: bench.onboard().set_current_to is not None, 30.0)
+    assert bench.run(lambda: bench.onboard().item_to_set.seq is not None, 30.0)
     drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: True)
     bench.kill_and_restart(0.0, store=False)
     bench.assign(task_list('DEF', 2))

@@ -170,16 +170,16 @@ def test_a_new_list_during_a_hold_leaves_it_and_a_later_task_prolongs_it(kind):
     bench.assign(first)
     assert bench.run(lambda: bench.completed() == ['A'], 200.0)
     bench.run(limit=10.0)
-    uploads = bench.onboard().upload_started_at
+    uploads = bench.onboard().latest_upload.started_at
     bench.assign(timed('B', 2, waits=[48.0], begins=[500.0]))
     bench.run(limit=5.0)
-    assert bench.onboard().upload_started_at == uploads
+    assert bench.onboard().latest_upload.started_at == uploads
     assert bench.onboard().revision == 2
     bench.assign(timed('B', 3, waits=[90.0], begins=[550.0]))
     begun = bench.now
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 300.0)
     assert bench.now - begun >= 90.0
-    assert bench.onboard().upload_started_at > uploads
+    assert bench.onboard().latest_upload.started_at > uploads
 
 
 @BOTH

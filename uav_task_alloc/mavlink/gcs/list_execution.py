@@ -98,7 +98,7 @@ class ListExecution:
         def done(t: float) -> None:
             onboard.progress.retag(diff.items)
             onboard.progress.note_set_current(diff.start, t)
-            onboard.set_current_to, self._current_set = None, True
+            onboard.item_to_set.seq, self._current_set = None, True
             onboard.adopt(diff, t, tasks)
 
         onboard.progress.begin_set_current(diff.start)
@@ -111,13 +111,13 @@ class ListExecution:
         flying = in_mission and not sender.must_start
         self._current_set = self._current_set and not flying
         if flying and self._mission_ended():
-            onboard.set_current_to = onboard.progress.current
+            onboard.item_to_set.seq = onboard.progress.current
             sender.must_start = True
             # in mission mode it would start again at the first item
             return sender.set_mode(ModeFunction.HOLD, now)
-        if flying and onboard.set_current_to is None and self._set_back_late(now):
-            onboard.set_current_to = onboard.progress.current
-        if flying and onboard.set_current_to is None:
+        if flying and onboard.item_to_set.seq is None and self._set_back_late(now):
+            onboard.item_to_set.seq = onboard.progress.current
+        if flying and onboard.item_to_set.seq is None:
             self._refused_list = None
             onboard.progress.note_mission_mode()
             self._end_of_list.end_hold()
@@ -133,15 +133,15 @@ class ListExecution:
             return []
         if self._telemetry.mode is ModeFunction.TAKEOFF:
             return sender.wait_for('the end of the take-off')
-        if onboard.set_current_to is None and not (flying or self._current_set) and (
+        if onboard.item_to_set.seq is None and not (flying or self._current_set) and (
                 not self._profile.atomic or self._may_have_ended()):
             # ArduPilot resumes after the item that it flew last
             if not self._profile.atomic and self._current_unreported(now):
                 return sender.wait_for('the current item since the hold')
-            onboard.set_current_to = onboard.progress.current
-        if onboard.set_current_to is not None:
+            onboard.item_to_set.seq = onboard.progress.current
+        if onboard.item_to_set.seq is not None:
             return self._set_current(
-                MissionDiff(DiffKind.JUMP, onboard.progress.items, onboard.set_current_to), now
+                MissionDiff(DiffKind.JUMP, onboard.progress.items, onboard.item_to_set.seq), now
             )
         return sender.set_mode(ModeFunction.MISSION, now)
 

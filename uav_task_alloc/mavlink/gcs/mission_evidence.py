@@ -41,7 +41,8 @@ class MissionEvidence:
         telemetry, onboard = self._telemetry, self._onboard
         return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
                 and now - telemetry.current_at < LATE_REACHED
-                and (onboard.taken or now - onboard.mission.verified_at < LATE_REACHED))
+                and (onboard.latest_upload.taken
+                     or now - onboard.mission.verified_at < LATE_REACHED))
 
     def returning(self) -> bool:
         """Whether the item that returns or lands is next, is being flown, or is flown."""
@@ -160,7 +161,7 @@ class MissionEvidence:
     def uploading(self) -> tuple[int, ...]:
         """`AuthorityRecord.uploading`; () where the current item is of the mission on board."""
         items, start = self._onboard.progress.items, self._unset_start()
-        if (diff := self._onboard.unknown_upload) is not None:
+        if (diff := self._onboard.latest_upload.unknown) is not None:
             items, start = diff.items, diff.start
         if start is None:
             return ()
@@ -173,6 +174,6 @@ class MissionEvidence:
         onboard = self._onboard
         if self._atomic:
             return None
-        if onboard.set_current_to is not None or onboard.stored is MissionState.VERIFIED:
-            return onboard.set_current_to
+        if onboard.item_to_set.seq is not None or onboard.stored is MissionState.VERIFIED:
+            return onboard.item_to_set.seq
         return onboard.progress.current or 0

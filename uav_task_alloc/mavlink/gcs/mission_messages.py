@@ -59,30 +59,30 @@ class MissionMessages:
                 self._onboard.is_of_known_mission(message, now, flying)):
             seq = max(0, message.seq - own)
             self._onboard.resume.note_current(seq, now, self._telemetry.frame)
-            if self._onboard.set_current_to is None:  # else seq is of the previous mission
+            if self._onboard.item_to_set.seq is None:  # else seq is of the previous mission
                 progress.note_current(seq, now, flying, self._telemetry.frame,
                                       self._telemetry.mission_restarted,
                                       self._telemetry.showed_mission)
             elif flying:
-                self._onboard.note_flown_unset(seq, now)
-            ended = self._telemetry.mission_ended and self._onboard.set_current_to is None
+                self._onboard.item_to_set.note_flown(seq, now)
+            ended = self._telemetry.mission_ended and self._onboard.item_to_set.seq is None
             may_have_ended = flying or ended if not self._atomic else (  # PX4: take-off too
                 self._telemetry.airborne_since_mission and progress.may_have_ended_unseen(seq))
             if may_have_ended and message.mission_state == d.MISSION_STATE_COMPLETE:
                 progress.note_mission_complete(seq, now, self._telemetry.frame)
-            if not self._sender.busy and not self._onboard.open:
+            if not self._sender.busy and not self._onboard.latest_upload.is_open:
                 self._onboard.watch(message, now)
         elif kind == 'STATUSTEXT':
             self._watch.receive_status_text(message, now)
             self._sender.note_arming_refusal(str(message.text))
             self._onboard.list.horizon.note(str(message.text))
             if str(message.text).startswith(_CHANGED) and not (
-                    self._sender.busy or self._onboard.open):
+                    self._sender.busy or self._onboard.latest_upload.is_open):
                 self._onboard.mission.note_changed(now)
             self._notes += filter(None, (self._status_text_log.receive(message, now),))
         self._doubted = (self._doubted or self._peer.changed_by_another(message)
                          or progress.take_contradicted())
-        if self._doubted and not (self._sender.busy or self._onboard.open):
+        if self._doubted and not (self._sender.busy or self._onboard.latest_upload.is_open):
             self._doubted = not self._onboard.mission.note_changed(now)
 
     def _position(self, message: Message, newest: bool, now: float) -> None:

@@ -38,10 +38,11 @@ class MissionTransfers:
         if seq is not None and self._authority.held:
             onboard.progress.begin_set_current(seq)
             return self._sender.set_current(
-                seq + onboard.own, now, lambda t: onboard.note_set(seq, t))
+                seq + onboard.own, now, lambda t: onboard.item_to_set.note_set(seq, t))
         self._sender.waits_for = 'its upload'
         if (onboard.upload.state in (UploadState.BACKOFF, UploadState.DRAINING)
-                and onboard.outdated and onboard.held is not None and onboard.wanted()
+                and onboard.latest_upload.is_outdated(onboard.tasks)
+                and onboard.held is not None and onboard.wanted()
                 and not onboard.upload.may_be_stored):
             return onboard.begin_upload(onboard.diff(), now)
         return self._end_of_list.held_too_long(now) or []

@@ -12,13 +12,10 @@ from uav_task_alloc.mavlink.gcs.resume import Resume
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_failures import UploadFailures
 from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
-from uav_task_alloc.mavlink.mission.flown_meanwhile import (
-    first_task,
-    next_after_unset,
-    next_unflown,
-    resumed_at,
-)
+from uav_task_alloc.mavlink.mission.flown_meanwhile import first_task, resumed_at
+from uav_task_alloc.mavlink.mission.item_to_set import ItemToSet
 from uav_task_alloc.mavlink.mission.items import Item, TaskList, all_alike, home_item
+from uav_task_alloc.mavlink.mission.latest_upload import LatestUpload
 from uav_task_alloc.mavlink.mission.outcomes import Accepted, Downloaded, Failed, Mission, Verified
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
@@ -60,20 +57,16 @@ class OnboardMission:
         # PX4 ignores a command to set the current item while its mission is read
         self.upload.may_read = lambda: not profile.atomic or not (
             self.upload.events or self.next_item() is not None)
-        self.set_current_to: int | None = None  # seq to set, unless the upload has set it
+        self.item_to_set = ItemToSet(self.progress, profile.atomic)
+        self.latest_upload = LatestUpload()
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._at_start: object = None  # of the upload: tasks done, detour points left out
         self._reports = ReportsDuringUpload(self.progress, origin, profile.atomic)
         self.mission = VerifiedMission(self.own, profile.atomic)
         self._changes = MissionChanges(self.list, self.progress, telemetry, profile)
         self._failures = UploadFailures(self.list, self.own, self.notes)
-        self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
-        self.taken = False  # the vehicle has taken all items of the latest transfer
-        self._unconfirmed: tuple[MissionDiff, TaskList] | None = None  # sent; perhaps on board
-        self.item_time = self.upload_started_at = 0.0  # [s] per item, smoothed; of the latest
         self._completed_for: tuple[TaskList, int] | None = None
         self._perhaps_foreign = False  # read after a restart, and not the recorded mission
-        self._flown_unset: int | None = None  # flown though `set_current_to` is not set yet
 
     @property
     def held(self) -> tuple[Item, ...] | None:
@@ -83,29 +76,12 @@ class OnboardMission:
     @property
     def state(self) -> MissionState:
         """UPLOADING during a transfer, else `stored`."""
-        return MissionState.UPLOADING if self._uploading is not None else self.mission.state
+        return MissionState.UPLOADING if self.latest_upload.running else self.mission.state
 
     @property
     def stored(self) -> MissionState:
         """State of the stored mission, independent of a running transfer."""
         return self.mission.state
-
-    @property
-    def open(self) -> bool:
-        """Whether a running or ended transfer is not known to be taken by the vehicle."""
-        return self._unconfirmed is not None or (self._uploading is not None and not self.taken)
-
-    @property
-    def unknown_upload(self) -> MissionDiff | None:
-        """What a transfer would put on board that is not known to be taken; None: none."""
-        uploading = self._unconfirmed or (None if self.taken else self._uploading)
-        return uploading and uploading[0]
-
-    @property
-    def outdated(self) -> bool:
-        """Whether the transfer is for an older list."""
-        return (self._uploading is not None and self.tasks is not None
-                and self._uploading[1].revision != self.tasks.revision)
 
     @property
     def tasks(self) -> TaskList | None:
@@ -143,8 +119,8 @@ class OnboardMission:
     def begin_upload(self, diff: MissionDiff, now: float) -> list[Message]:
         """Start the upload of `diff` for the present list."""
         assert self.tasks is not None
-        self._uploading, self.taken, self.transfer_failed = (diff, self.tasks), False, False
-        self.upload_started_at, self._reports.sent_since = now, None
+        self.latest_upload.begin(diff, self.tasks, now)
+        self.transfer_failed, self._reports.sent_since = False, None
         self.list.horizon.begin()
         self._at_start = self.progress.done, self.list.left_out
         home = (home_item(self._telemetry.home, self._origin, self._profile.rules),) * self.own
@@ -153,19 +129,16 @@ class OnboardMission:
 
     def next_item(self) -> int | None:
         """Seq to set during a transfer: past what PX4 has flown meanwhile; None: it flies on."""
-        if self._uploading is None or not self._profile.atomic or (
-                self._may_be_of_new and not self.taken):
+        latest = self.latest_upload
+        if latest.running is None or not self._profile.atomic or (
+                self._may_be_of_new and not latest.taken):
             return None
-        return next_unflown(self.progress) if self.set_current_to is None else self.set_current_to
-
-    def note_set(self, seq: int, now: float) -> None:
-        """Note that the current item was set during a transfer."""
-        self.set_current_to = None
-        self.progress.note_set_current(seq, now)
+        return self.item_to_set.while_uploading()
 
     def _overtaken(self) -> bool:
         """Whether, before another attempt, the upload is partly flown or of an older list."""
-        return self._reports.has_reached or self.outdated or self._at_start != (
+        outdated = self.latest_upload.is_outdated(self.tasks)
+        return self._reports.has_reached or outdated or self._at_start != (
             self.progress.done, self.list.left_out)
 
     def receive(self, message: Message, now: float) -> list[Message]:
@@ -177,7 +150,7 @@ class OnboardMission:
                 message, now, self._telemetry.ends_by_mission)
         out = self.upload.receive(message, now)
         if not self.upload.may_be_stored:
-            if self.upload.busy and self._unconfirmed is None:
+            if self.upload.busy and not self.latest_upload.is_unconfirmed:
                 self._reports.sent_since = None
         elif self._reports.sent_since is None:
             self._reports.note_sent(self._telemetry.frame)
@@ -187,9 +160,10 @@ class OnboardMission:
     def step(self, now: float) -> list[Message]:
         """Advance time; returns the messages to send."""
         out = self.upload.step(now)
-        self._reports.step(self.unknown_upload, now)
-        if self._uploading is not None and not self.taken and self._profile.atomic and (
-                first_task(self._uploading[0]) in self.progress.completed) and (
+        latest = self.latest_upload
+        self._reports.step(latest.unknown, now)
+        if latest.running is not None and not latest.taken and self._profile.atomic and (
+                first_task(latest.running[0]) in self.progress.completed) and (
                 not self.upload.sent_all):  # it would start at a task flown meanwhile
             out += self.upload.cancel(now)
         self._settle(now)
@@ -199,7 +173,8 @@ class OnboardMission:
         """Process MISSION_ITEM_REACHED; after all items are sent it may be of either mission."""
         if not self.resume.located:
             self.resume.note_reached(seq, now, self._telemetry.frame)
-        if self._may_be_of_new and not (self._appends and seq < len(self.progress.items)):
+        kept = self.latest_upload.appends and seq < len(self.progress.items)
+        if self._may_be_of_new and not kept:
             self._reports.add_reached(seq, now, self._telemetry.frame)
         else:
             self._reports.note_passed(seq, now, self._telemetry.frame, is_current=False)
@@ -208,13 +183,8 @@ class OnboardMission:
     @property
     def _may_be_of_new(self) -> bool:
         """Whether a report may be of the mission of an upload."""
-        return self._unconfirmed is not None or (self.open and self.upload.may_be_stored)
-
-    @property
-    def _appends(self) -> bool:
-        """Whether the upload leaves the items that are on board."""
-        uploading = self._unconfirmed or self._uploading
-        return uploading is not None and uploading[0].kind is DiffKind.APPEND
+        latest = self.latest_upload
+        return latest.is_unconfirmed or (latest.is_open and self.upload.may_be_stored)
 
     def is_of_known_mission(self, message: Message, now: float, flying: bool) -> bool:
         """Whether a MISSION_CURRENT refers to the known mission; else it is kept.
@@ -225,7 +195,8 @@ class OnboardMission:
             flying: whether the vehicle is in mission mode.
         """
         seq, frame = max(0, message.seq - self.own), self._telemetry.frame
-        if not self.open or self._appends or not (flying or self._profile.atomic):
+        latest = self.latest_upload
+        if not latest.is_open or latest.appends or not (flying or self._profile.atomic):
             self._reports.note_passed(seq, now, frame, is_current=True, flying=flying,
                                       of_taken=self.mission.is_taken(message))
             return True  # ArduPilot's current item stays that of the old mission until it flies
@@ -237,30 +208,20 @@ class OnboardMission:
         self._reports.add_current(seq, now, frame, flying, plan_id(message))
         return False
 
-    def note_flown_unset(self, seq: int, now: float) -> None:
-        """Take a MISSION_CURRENT of a vehicle that flies before its current item is set.
-
-        Args:
-            seq: index without home.
-            now: steady time [s].
-        """
-        before, self._flown_unset = self._flown_unset, seq
-        if before is not None and not self._profile.atomic:
-            self.set_current_to = next_after_unset(
-                self.progress, before, seq, now, self.set_current_to)
-
     def abort(self) -> list[Message]:
         """Abort the transfer: another party controls the vehicle."""
         if self.upload.busy:
             self.upload.reset()
-        if self._uploading is not None:
-            if self._reports.sent_since is not None and not self.taken:
-                self._unconfirmed = self._uploading
-            else:
-                self._reports.credit(self._uploading[0])
-            self._uploading = None
-            self.mission.interrupt()
+        if self.latest_upload.running is not None:
+            self._leave_upload()
         return []
+
+    def _leave_upload(self, refused: bool = False) -> None:
+        """End the transfer without its verification."""
+        sent = self.latest_upload.leave(self._reports.sent_since is not None and not refused)
+        if sent is not None:
+            self._reports.credit(sent)
+        self.mission.interrupt()
 
     def verified(self) -> bool:
         """Whether the list is verified on board and nothing has to change."""
@@ -270,12 +231,12 @@ class OnboardMission:
 
     def restarted(self) -> None:
         """Reset after a restart of the vehicle: transfer lost, mission unknown."""
-        until = self._reports.end(self.unknown_upload)
+        until = self._reports.end(self.latest_upload.unknown)
         self.upload.reset()
         self._failures.clear()
         self.progress.invalidate(until)
         self.mission.reset()
-        self._uploading = self._unconfirmed = None
+        self.latest_upload.forget()
         self.resume.reset()
 
     def watch(self, message: Message, now: float) -> None:
@@ -305,51 +266,39 @@ class OnboardMission:
             event = self.upload.events.popleft()
             if isinstance(event, Downloaded):
                 self._on_read(event, now)
-            elif self._uploading is not None:
-                diff, tasks = self._uploading
+            elif self.latest_upload.running is not None:
+                diff, tasks = self.latest_upload.running
                 if isinstance(event, Accepted):
                     self._begin_epoch(diff, now)
                 elif isinstance(event, Verified):
                     self._begin_epoch(diff, now)
-                    self._uploading = None
+                    self.latest_upload.end()
                     self._verify(diff.items, tasks.revision, now)
                 else:
-                    self._uploading = None
                     self._on_failure(event, diff, tasks, now)
 
     def _begin_epoch(self, diff: MissionDiff, now: float) -> None:
-        if self.taken:
+        if self.latest_upload.taken:
             return
-        self.taken = True
+        self.latest_upload.note_taken(diff, now)
         self._telemetry.note_new_mission()
         of_new = self._reports.begin_new(diff)
-        self.item_time = (self.item_time + (now - self.upload_started_at) / len(diff.items)) / 2.0
         self.resume.flown.keep()
-        self._flown_unset, later = None, resumed_at(
-            self.progress.items, self.progress.current, diff)
+        resumed = resumed_at(self.progress.items, self.progress.current, diff)
         if diff.kind is DiffKind.APPEND:
             self.progress.extend(diff.items)
         else:
             self.progress.begin(diff.items, diff.start, now, since=self._reports.sent_since)
         self._reports.replay(of_new, self.mission.reported_id)
-        current = self.progress.current
-        if diff.kind is not DiffKind.APPEND and not self._profile.atomic:
-            self.set_current_to = current if current is not None and (
-                current < len(diff.items)) else diff.start
-        elif later > diff.start == current:  # PX4 has flown on during the upload
-            self.progress.note_set_current(later, now)
-            self.set_current_to = later
-        elif self._profile.atomic and self.upload.sent_before and current is not None and all(
-                item.task in self.progress.completed
-                for item in diff.items[diff.start:current]) and current > diff.start:
-            self.set_current_to = current  # it would fly again what it flew after an earlier try
+        self.item_to_set.choose(diff, resumed, self.upload.sent_before, now)
 
     def _correct(self, held: tuple[Item, ...], now: float) -> bool:
         """Count reports for the items that PX4 has taken, where they are others than were sent."""
         if not self._profile.atomic or not self.resume.located or not self._reports.correct(
                 self.resume.read_again(held, self.tasks)[0], now):
             return False
-        self.taken, self.set_current_to, self.mission.altered = False, None, True
+        self.latest_upload.taken, self.item_to_set.seq = False, None
+        self.mission.altered = True
         return True
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
@@ -363,9 +312,8 @@ class OnboardMission:
             self.transfer_failed = True
             return
         held, known = event.items[self.own:], self.progress.items
-        if self._unconfirmed is not None:
-            diff, tasks = self._unconfirmed
-            self._unconfirmed = None
+        if (unconfirmed := self.latest_upload.take_unconfirmed()) is not None:
+            diff, tasks = unconfirmed
             if all_alike(diff.items, held):
                 self._begin_epoch(diff, now)
                 self._verify(diff.items, tasks.revision, now)
@@ -385,11 +333,7 @@ class OnboardMission:
                             now, read=True, since=since)
 
     def _on_failure(self, event: Failed, diff: MissionDiff, tasks: TaskList, now: float) -> None:
-        self.mission.interrupt()
         self.transfer_failed = event.reason != SUPERSEDED
-        if event.result is None and self._reports.sent_since is not None and not self.taken:
-            self._unconfirmed = diff, tasks
-        else:
-            self._reports.credit(diff)
+        self._leave_upload(refused=event.result is not None)
         if self.transfer_failed:
             self.transfer_failed = self._failures.take(event, diff, tasks, now)

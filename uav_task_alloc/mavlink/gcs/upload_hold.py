@@ -38,7 +38,7 @@ class UploadHold:
             return False
         distance = math.dist(self._telemetry.position, listed.position or UNKNOWN) - listed.radius
         wanted = onboard.wanted()
-        margin = _ARRIVAL * (listed is wanted[0]) + onboard.item_time * len(wanted)
+        margin = _ARRIVAL * (listed is wanted[0]) + onboard.latest_upload.item_time * len(wanted)
         if same and self._profile.atomic and distance < _NEAR + margin * self._telemetry.pace:
             return True
         being_served = same or item.completes

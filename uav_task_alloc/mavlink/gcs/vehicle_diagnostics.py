@@ -134,7 +134,7 @@ def upload_progress(onboard: OnboardMission, now: float) -> str:
     if count == 0:
         return ''
     text = (f'read back {read}' if read else f'sent {sent}') + f' of {count} items'
-    done, elapsed = sent + read, now - onboard.upload_started_at
+    done, elapsed = sent + read, now - onboard.latest_upload.started_at
     if done == 0 or elapsed <= 0.0:
         return text
     return f'{text}, about {elapsed * (2 * count - done) / done:.0f} s left'

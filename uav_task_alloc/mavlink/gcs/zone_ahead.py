@@ -45,7 +45,7 @@ class ZoneAhead:
             The zone; None: none, or the current item is not known.
         """
         telemetry, onboard, progress = self._telemetry, self._onboard, self._onboard.progress
-        zones, seq = onboard.list.way_home.zones(), onboard.set_current_to
+        zones, seq = onboard.list.way_home.zones(), onboard.item_to_set.seq
         if not zones:
             return None
         seq = progress.current if seq is None else seq
@@ -64,7 +64,7 @@ class ZoneAhead:
         It was planned from where the vehicle was before the upload, which has flown on by its
         old mission. Where a zone is now between, the upload is not ended.
         """
-        telemetry, upload = self._telemetry, self._onboard.unknown_upload
+        telemetry, upload = self._telemetry, self._onboard.latest_upload.unknown
         if not self._profile.atomic:
             return True
         if self._onboard.list.leave_out_detours():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from uav_task_alloc.mavlink.mission.diff import MissionDiff, point_at_or_before
 from uav_task_alloc.mavlink.mission.item import Item, all_alike
-from uav_task_alloc.mavlink.mission.progress import ProgressTable
 
 
 def resumed_at(items: tuple[Item, ...], current: int | None, diff: MissionDiff) -> int:
@@ -34,46 +33,6 @@ def _leg_end(items: tuple[Item, ...], begin: int | None) -> int | None:
     """Index of the item that completes the task under way at `begin`."""
     return None if begin is None else next(
         (n for n in range(begin, len(items)) if items[n].completes), None)
-
-
-def next_unflown(progress: ProgressTable) -> int | None:
-    """Return where a vehicle goes on that flies to a task which is completed.
-
-    Args:
-        progress: of the vehicle.
-
-    Returns:
-        The index of the next item of another task; None: it does not fly to such a task, or there
-        is no other.
-    """
-    item = progress.active
-    if item is None or item.task not in progress.completed:
-        return None
-    return next((n for n, other in enumerate(progress.items[:progress.last_flown + 1])
-                 if n > (progress.current or 0) and other.task not in progress.completed), None)
-
-
-def next_after_unset(progress: ProgressTable, before: int, seq: int, now: float,
-                     otherwise: int | None) -> int | None:
-    """Return where an ArduPilot goes on that has flown before its current item was set.
-
-    Args:
-        progress: of the vehicle; what it has reached is credited.
-        before: index of the item that it flew until now.
-        seq: index of the item that it flies.
-        now: steady time [s] at which that was reported.
-        otherwise: returned where it has flown to no other item, or all tasks are completed.
-
-    Returns:
-        The index of the first item of a task that is not completed.
-    """
-    items = progress.items
-    if not before < seq <= len(items):
-        return otherwise
-    if progress.evidence.was_at(items[before], now):
-        progress.credit(items[before])
-    return next((n for n, item in enumerate(items)
-                 if item.task and item.task not in progress.completed), otherwise)
 
 
 def first_task(diff: MissionDiff) -> str | None:
