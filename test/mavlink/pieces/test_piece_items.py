@@ -147,13 +147,14 @@ def test_a_gap_while_another_mission_may_be_on_board_is_not_flown():
 
 def test_a_gap_after_the_mission_was_replaced_is_not_flown():
     flown = Flown().fly(at(0, 0), at(100, 0))
-    version = flown.coverage.version
+    version = flown.coverage.pieces.version
     flown.coverage.note_replaced(Item(16, task='X'))
     flown.fly(at(102, 2), at(104, 5), item=Item(16, task='X'))
     flown.t += 400.0 / SPEED
     flown.fly(at(300, 200), at(300, 300), item=Item(16, task='X'))
     assert not flown.covered
-    assert flown.coverage.version == version  # else the mission on board is another one at once
+    # else the mission on board is another one at once
+    assert flown.coverage.pieces.version == version
     assert flown.rest() == [(100, 0), (300, 0), (300, 300)]
 
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Container, Iterable, Sequence
-from dataclasses import replace
-from itertools import accumulate, pairwise
+from itertools import pairwise
 
-from uav_task_alloc.mavlink.mission.flown_path import GAP, PositionSample
+from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.item import Item
+from uav_task_alloc.mavlink.mission.listed_pieces import ListedPieces
 from uav_task_alloc.mavlink.mission.piece import LEAST_PART, POSITION_SLACK, SPEED_MARGIN, Piece
 from uav_task_alloc.mavlink.mission.piece_mark import (
     PART_FLOWN,
@@ -20,14 +20,12 @@ from uav_task_alloc.mavlink.mission.piece_mark import (
     PART_UNDER_WAY,
     PieceMark,
 )
-from uav_task_alloc.mavlink.mission.stop_items import place_of
+from uav_task_alloc.mavlink.mission.recent_positions import RecentPositions
 from uav_task_alloc.mavlink.mission.task_list import MissionStop
 from uav_task_alloc.model import Point
 
 _CORRIDOR, _CORRIDOR_PLANE = 10.0, 150.0  # [m] from a way at which a vehicle still follows it
-_LATE = 32  # positions: six seconds, by which the report of the current item may be late
-_RECENT = 512  # positions in which that report may be late in a simulation that runs faster
-_KEPT = 64  # pieces
+_KEPT = 64  # ways that were left
 _UNSHOWN = 1.5  # [s] until a vehicle has shown its mode again, where no frame is lost
 
 
@@ -38,18 +36,16 @@ class PieceCoverage:
         plane: whether the vehicle turns as wide as a plane.
 
     Attributes:
-        version: changes with the ways that are left.
+        pieces: the ways, and what is left of each.
         corridor: distance [m] from a way at which the vehicle still follows it.
         mission_known: whether the mission on board is known, so that what is flown in silence is.
         recorded: what was flown before this run of the bridge was stored.
     """
 
     def __init__(self, plane: bool = False) -> None:
-        self.version, self.mission_known = 0, True
+        self.pieces, self.mission_known = ListedPieces(), True
         self.corridor = _CORRIDOR_PLANE if plane else _CORRIDOR
-        self._pieces: dict[str, Piece] = {}
         self.left: deque[str] = deque(maxlen=_KEPT)  # ways that were left, to be taken
-        self._partly: dict[str, None] = {}  # those of which a part is flown
         self._under_way: str | None = None
         self._latest: str | None = None  # under way, or left without flying to another task
         self._ending: str | None = None  # passed in flight; it is not known how far it was flown
@@ -57,59 +53,18 @@ class PieceCoverage:
         self._restored: set[str] = set()  # under way when the previous run of the bridge ended
         self._restored_until = math.inf  # vehicle time [s]: another mode was shown in this run
         self.recorded = False  # what was flown before this run is known by its file
-        self._recent: deque[PositionSample] = deque(maxlen=_RECENT)  # in mission mode, without gap
-        self._unseen_since: PositionSample | None = None  # the last one before a gap before these
+        self._recent = RecentPositions()
         self._fastest = 0.0  # [m/s]
 
     def set_listed(self, stops: Iterable[MissionStop]) -> None:
         """Take the ways of a list; what was flown of the same way stays flown."""
-        listed: set[str] = set()
-        for stop in stops:
-            if not stop.task.path:
-                continue
-            name, place = stop.task.id, place_of(stop.task)
-            piece = self._pieces.pop(name, None)
-            if piece is None or piece.place != place:
-                self._partly.pop(name, None)
-                at = [0.0, *accumulate(math.dist(a, b) for a, b in pairwise(stop.task.path))]
-                piece = Piece(stop.task.path, place, at, 0.0, at[-1], stop.reversed)
-                piece.measure()
-                self.version += 1
-            else:
-                turned = piece.path != stop.task.path
-                # one that is being flown is flown on as the mission on board has it
-                flown = name in (self._under_way, self._ending)
-                wanted = piece.reversed is not turned if flown else stop.reversed
-                if turned or piece.reversed is not wanted:
-                    self._turn(piece, stop.task.path, wanted)
-            self._pieces[name] = piece
-            listed.add(name)
-        for name in [name for name in self._pieces if name not in listed][:-_KEPT]:
-            del self._pieces[name]
-            self._partly.pop(name, None)
-
-    def _turn(self, piece: Piece, path: tuple[Point, ...], backwards: bool) -> None:
-        """Take another direction of flight, or of the path."""
-        piece.turn(path, backwards)
-        self.version += 1
+        self.pieces.set_listed(stops, flown=(self._under_way, self._ending))
 
     def rest(self, stop: MissionStop) -> MissionStop:
         """A stop with what is left of its way, in the direction of flight."""
         if stop.task.id == self._ending:
             self._leave(self._ending)
-        piece = self._pieces.get(stop.task.id)
-        if piece is None or not stop.task.path or (
-                piece.high - piece.low >= piece.at[-1] - 1e-6):
-            return stop
-        way = piece.way if piece.reversed is stop.reversed else reversed(piece.way)
-        return replace(stop, rest=tuple(way), begun=True)
-
-    def begin_of_rest(self, stop: MissionStop) -> float:
-        """Where on the way of a stop its rest begins [m], in the direction of flight."""
-        piece = self._pieces.get(stop.task.id)
-        if piece is None or not stop.task.path:
-            return 0.0
-        return piece.at[-1] - piece.high if stop.reversed else piece.low
+        return self.pieces.rest(stop)
 
     @property
     def latest(self) -> str | None:
@@ -127,13 +82,13 @@ class PieceCoverage:
             True where the item is of such a way, nothing of that is known to be flown, and the
             vehicle is not at its first point.
         """
-        piece = self._pieces.get(item.task) if item is not None and item.along else None
+        piece = self.pieces.get(item.task) if item is not None and item.along else None
         return piece is not None and piece.flown < LEAST_PART and (
             math.dist(place, piece.way[0]) > self.corridor + POSITION_SLACK)
 
     def is_followed(self, stop: MissionStop) -> bool:
         """Whether the vehicle is flying along the way of a stop, in the direction of the stop."""
-        piece = self._pieces.get(stop.task.id)
+        piece = self.pieces.get(stop.task.id)
         return stop.task.id == self._under_way and (
             piece is None or piece.reversed is stop.reversed)
 
@@ -150,10 +105,10 @@ class PieceCoverage:
         """
         task = item.task if item is not None and in_mission and item.along else None
         if not in_mission:
-            self._forget_recent()
+            self._recent.clear()
         elif task is not None or (item is not None and item.task != self._latest):
             self._latest = task
-        piece = None if task is None else self._pieces.get(task)
+        piece = self.pieces.get(task)
         if task == self._under_way and not (piece is not None and piece.gone):
             return
         before, self._under_way = self._under_way, task
@@ -167,9 +122,9 @@ class PieceCoverage:
             places = [each.position for each in mission
                       if each.task == task and each.along and each.position is not None]
             if piece.is_turned(places):  # a later list turned it
-                self._turn(piece, piece.path, not piece.reversed)
+                self.pieces.turn(piece, piece.path, not piece.reversed)
             self._begin(piece, vehicle_now)
-            self._partly[task or ''] = None
+            self.pieces.note_begun(task or '')
 
     def note_left(self, shown_until: float) -> None:
         """Note that the vehicle is not in mission mode; it may have left that some time ago.
@@ -180,7 +135,7 @@ class PieceCoverage:
         """
         if _UNSHOWN < self._sampled - shown_until < math.inf:
             for name in (self._under_way, self._ending):
-                piece = self._pieces.get(name or '')
+                piece = self.pieces.get(name)
                 if piece is not None:
                     piece.withdraw(shown_until)
         self.note_active(None, False)
@@ -191,13 +146,12 @@ class PieceCoverage:
             piece.gone, piece.seen, piece.off = False, None, None
         piece.in_silence = False
         if piece.seen is None:
-            recent, begin, unseen = list(self._recent), piece.next_point(), self._unseen_since
-            at = next((n for n in reversed(range(len(recent))) if math.dist(
-                recent[n].position, begin) <= self.corridor), None)
-            if at is None and unseen is not None and 0 < len(recent) <= _LATE:
+            begin = piece.next_point()
+            unseen, samples = self._recent.on_way_from(begin, self.corridor)
+            if unseen is not None:
                 piece.seen, piece.off = unseen.t, (unseen.t, math.dist(unseen.position, begin))
-                self._follow(piece, recent[0], unseen.t)  # it came to it unseen
-            for sample in recent[-_LATE:] if at is None else recent[at:]:
+                self._follow(piece, samples[0], unseen.t)  # it came to it unseen
+            for sample in samples:
                 self._follow(piece, sample, sample.t)
             if piece.off is not None:  # it may have come to it since, or it cannot
                 since, back = piece.off
@@ -210,20 +164,18 @@ class PieceCoverage:
         Args:
             item: its first one.
         """
-        self._unseen_since = None
+        self._recent.note_replaced()
         for name in (self._under_way, self._ending):
-            piece = self._pieces.get(name or '')
+            piece = self.pieces.get(name)
             if piece is not None and not (
                     item is not None and item.along and item.task == name):
                 piece.gone = True
 
     def _leave(self, name: str | None) -> None:
         """Fly the rest of a way from where it was left."""
-        piece = self._pieces.get(name or '')
         if name == self._ending:
             self._ending = None
-        if piece is not None and piece.commit():
-            self.version += 1
+        self.pieces.commit(name)
 
     def add_position(self, sample: PositionSample, fastest: float) -> None:
         """Take a position of the vehicle.
@@ -233,13 +185,9 @@ class PieceCoverage:
             fastest: [m/s] that it flies.
         """
         before, self._sampled, self._fastest = self._sampled, sample.t, fastest
-        if not 0.0 <= sample.t - before <= GAP:
-            last = self._recent[-1] if self._recent and sample.t > before else None
-            self._forget_recent()
-            self._unseen_since = last
-        self._recent.append(sample)
+        self._recent.add(sample, before)
         for name in {self._under_way, self._ending, *self._restored}:
-            piece = self._pieces.get(name or '')
+            piece = self.pieces.get(name)
             if piece is not None and not piece.gone:
                 self._follow(piece, sample, before)
                 piece.missed = piece.off is not None
@@ -263,10 +211,6 @@ class PieceCoverage:
             self._leave(name)
         self._restored.clear()
 
-    def _forget_recent(self) -> None:
-        self._recent.clear()
-        self._unseen_since = None
-
     def _follow(self, piece: Piece, sample: PositionSample, before: float) -> None:
         piece.follow(sample, before, self._fastest, self.corridor, self.mission_known)
 
@@ -278,7 +222,7 @@ class PieceCoverage:
             vehicle_now: vehicle time [s].
             fastest: [m/s] that it flies.
         """
-        piece = self._pieces.get(task)
+        piece = self.pieces.get(task)
         if piece is None or math.isinf(self._sampled):
             return True
         left = piece.left
@@ -300,17 +244,9 @@ class PieceCoverage:
         Args:
             task: id.
         """
-        piece = self._pieces.get(task)
+        piece = self.pieces.get(task)
         return piece is None or piece.in_silence or (
             piece.left <= self.corridor + POSITION_SLACK)
-
-    def forget(self, task: str) -> None:
-        """Fly the whole way of a task again."""
-        piece = self._pieces.get(task)
-        self._partly.pop(task, None)
-        if piece is not None:
-            piece.restart()
-            self.version += 1
 
     def leave(self) -> None:
         """Note that the vehicle was restarted, or its mission is not known."""
@@ -319,15 +255,7 @@ class PieceCoverage:
 
     def marks(self, completed: Container[str]) -> tuple[PieceMark, ...]:
         """What a restarted bridge has to know of the pieces that are partly flown."""
-        if not self._partly:
-            return ()
-        for name in [name for name in self._partly if name in completed]:
-            del self._partly[name]
-        rows = ((name, self._pieces[name]) for name in self._partly)
-        return tuple(PieceMark(
-            name, *piece.path[0][:2], piece.place[2], round(piece.low, 2), round(piece.high, 2),
-            piece.reversed, piece.passed_points(), self._state(name, piece))
-            for name, piece in rows)
+        return self.pieces.marks(completed, self._state)
 
     def _state(self, name: str, piece: Piece) -> int:
         if name not in (self._under_way, self._ending) or piece.gone or not self.mission_known:
@@ -346,15 +274,10 @@ class PieceCoverage:
         """
         by_id = {stop.task.id: stop for stop in stops if stop.task.path}
         for mark in marks:
-            piece = self._pieces.get(mark.task)
             stop = by_id.get(mark.task)
-            if piece is None or stop is None or (
-                    *piece.path[0][:2], piece.place[2]) != mark[1:4]:
+            piece = None if stop is None else self.pieces.restore(mark)
+            if piece is None or stop is None:
                 continue
-            piece.low, piece.high, piece.reversed = mark.low, mark.high, mark.reversed
-            piece.measure()
-            piece.flown = mark.flown
-            self._partly[mark.task] = None
             piece.missed = mark.state == PART_MISSED
             ended = False
             if mark.state == PART_UNDER_WAY:
@@ -368,8 +291,7 @@ class PieceCoverage:
                     ended = ended or sample.t > self._restored_until
                 self._sampled = max(self._sampled, samples[-1].t)
             if piece.reversed != stop.reversed:
-                self._turn(piece, stop.task.path, stop.reversed)
-            self.version += 1
+                self.pieces.turn(piece, stop.task.path, stop.reversed)
         if samples and samples[-1].t > self._restored_until:
             self._leave_restored()
 
@@ -384,7 +306,7 @@ class PieceCoverage:
             item: found on board.
             sample: of the vehicle; None: not known.
         """
-        piece = self._pieces.get(item.task) if item is not None and item.along else None
+        piece = self.pieces.get(item.task) if item is not None and item.along else None
         if piece is None or item is None or self.recorded or piece.seen is not None or (
                 piece.flown >= LEAST_PART or item.position is None):
             return

@@ -340,7 +340,7 @@ class ProgressTable:
     def forget(self, task: str) -> None:
         """Forget the completion of a task id, which another task has now."""
         self.completed.pop(task, None)
-        self.coverage.forget(task)
+        self.coverage.pieces.forget(task)
         self._epoch.started = None if self._epoch.started == task else self._epoch.started
 
     def _note_active(self) -> None:

@@ -178,7 +178,8 @@ class WantedMission:
         ended = tuple(progress.completed), progress.pending, tuple(self._refused)
         coverage, way_home = progress.coverage, self.way_home.key
         left_out, horizon = self.left_out, self.horizon.stops
-        key = (self.tasks, ended, horizon, coverage.version, coverage.latest, left_out, way_home)
+        ways = coverage.pieces.version, coverage.latest
+        key = (self.tasks, ended, horizon, ways, left_out, way_home)
         if self._remaining is None or self._remaining[0] != key:
             tasks = self.tasks.without(chain.from_iterable(ended))
             tasks = replace(tasks, stops=self._rests(tasks.stops))
@@ -243,7 +244,7 @@ class WantedMission:
             start = self.leg.locate()
             place = None if start is None else start.point
         way = stop.task.path[::-1] if stop.reversed else stop.task.path
-        via = approach(stop.via, place, way, coverage.begin_of_rest(stop), self.zones(),
+        via = approach(stop.via, place, way, coverage.pieces.begin_of_rest(stop), self.zones(),
                        coverage.corridor, on_way)
         return stop if via == stop.via else replace(stop, via=via)
 
