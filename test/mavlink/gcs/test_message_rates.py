@@ -102,4 +102,4 @@ def test_a_message_is_not_late_whose_kind_is_rare_among_many_frames(others):
         for n in range(others):
             receive(d.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0), second + n / others)
         receive(d.MAVLink_mission_current_message(second), second + 1.0)
-        assert telemetry.current == second
+        assert telemetry.mission.current == second

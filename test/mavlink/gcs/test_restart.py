@@ -10,6 +10,7 @@ from authority_bench import MODES, flying as flying_held
 from findings_bench import distance, drop_messages, flown_once_each
 from flight_bench import FlightBench, flying, places
 from mission_bench import REPORTS_STATE, task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.status import UavMode
@@ -316,8 +317,9 @@ def test_a_repetition_after_a_restart_completes_nothing_of_the_mission_on_board(
     assert bench.run(lambda: len(bench.vehicles[1].flight.items) == 3, 3.0)
     bench.kill_and_restart(0.0)
     seen = bench.executor().telemetry
-    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: seen.current is None)
-    drop_messages(bench, 'down', 'MISSION_CURRENT', lambda m: seen.reached is not None)
+    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: seen.mission.current is None)
+    drop_messages(bench, 'down', 'MISSION_CURRENT',
+                  lambda m: d.MAVLINK_MSG_ID_MISSION_ITEM_REACHED in seen.received_ids)
     bench.assign(tasks)
     assert bench.run(lambda: bench.onboard().held is not None, 20.0)
     assert places(bench) == ['A']

@@ -16,10 +16,10 @@ from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemRepor
 def test_a_set_current_is_not_sent_again_once_a_later_item_is_reported(
         before, reported, plan, sent_again):
     executor, done = flying('px4', 'ABCD').executor(), []
-    telemetry, sender = executor.telemetry, executor.sender
-    telemetry.current, telemetry.plan_id = before, 7
+    mission, sender = executor.telemetry.mission, executor.sender
+    mission.current, mission.plan_id = before, 7
     assert sender.set_current(1, 100.0, done.append)
-    telemetry.current, telemetry.current_at, telemetry.plan_id = reported, 100.5, plan
+    mission.current, mission.current_at, mission.plan_id = reported, 100.5, plan
     assert bool(sender.finish(101.5)) is sent_again
     assert bool(done) is not sent_again
 
@@ -27,10 +27,10 @@ def test_a_set_current_is_not_sent_again_once_a_later_item_is_reported(
 @pytest.mark.parametrize(('before', 'shows'), [(1, False), (0, True)])
 def test_an_item_that_was_current_before_needs_the_ack_of_its_set_current(before, shows):
     executor, done = flying('ardupilot', 'ABCD').executor(), []
-    telemetry, sender = executor.telemetry, executor.sender
-    telemetry.current = before
+    mission, sender = executor.telemetry.mission, executor.sender
+    mission.current = before
     assert sender.set_current(1, 100.0, done.append)
-    telemetry.current, telemetry.current_at = 1, 100.5
+    mission.current, mission.current_at = 1, 100.5
     assert bool(sender.finish(101.5)) is not shows
     if not shows:
         ack = d.MAVLink_command_ack_message(d.MAV_CMD_DO_SET_MISSION_CURRENT, 0)
@@ -42,13 +42,13 @@ def test_an_item_that_was_current_before_needs_the_ack_of_its_set_current(before
 
 def test_a_command_is_repeated_only_after_all_messages_of_a_stall():
     executor, done = flying('px4', 'ABCD').executor(), []
-    telemetry, sender = executor.telemetry, executor.sender
-    telemetry.current = 0
+    mission, sender = executor.telemetry.mission, executor.sender
+    mission.current = 0
     assert sender.set_current(2, 100.0, done.append)
     sender.receive(d.MAVLink_system_time_message(0, 0))  # one that came before the answer
     assert sender.finish(101.5) == []
     assert sender.finish(101.52)
-    telemetry.current, telemetry.current_at = 2, 101.6
+    mission.current, mission.current_at = 2, 101.6
     assert sender.finish(101.6) is None
     assert done == [101.6]
 

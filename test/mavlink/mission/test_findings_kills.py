@@ -269,8 +269,8 @@ def items_at(*places):
 def test_a_position_of_long_after_a_reached_counts_where_the_current_items_agree(
         metres, seconds, after, known):
     telemetry = SimpleNamespace(has_position=False, position=(metres, 0.0, 50.0), speed=10.0,
-                                in_mission=True, mission_state=d.MISSION_STATE_ACTIVE, total=3,
-                                mode=ModeFunction.MISSION)
+                                in_mission=True, mode=ModeFunction.MISSION,
+                                mission=SimpleNamespace(state=d.MISSION_STATE_ACTIVE, total=3))
     reports = UnreadReports(telemetry, PositionHistory(), repeats=False)
     reports.note_current(0, 0.0, 1, located=False)
     reports.note_reached(0, 1.0, 2)

@@ -16,7 +16,7 @@ from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 def reports_of(place, repeats):
     """Reports of a vehicle in mission mode that stands at a place."""
     telemetry = SimpleNamespace(has_position=True, position=place, speed=0.0, in_mission=True,
-                                mission_state=d.MISSION_STATE_ACTIVE, total=3,
+                                mission=SimpleNamespace(state=d.MISSION_STATE_ACTIVE, total=3),
                                 mode=ModeFunction.MISSION)
     history = PositionHistory()
     history.add(PositionSample(1.0, place, (0.0, 0.0, 0.0)), True, 1.0, 1)
@@ -101,7 +101,7 @@ def test_a_reached_before_the_mission_has_another_number_of_items_is_of_the_one_
     reports = reports_of((100.0, 0.0, 50.0), repeats)
     reports.note_current(1, 0.5, 2, located=False)
     reports.note_reached(1, 1.0, 3)
-    reports._telemetry.total = total
+    reports._telemetry.mission.total = total
     reports.note_current(2, 1.5, 4, located=False)
     taken = reports.take_reached(items_at(0.0, 100.0, 200.0, 300.0), None, 2.0)
     assert [each.seq for each in taken] == [1] * known

@@ -234,23 +234,23 @@ class CommandSender:
             now: steady time [s].
             completion: called once MISSION_CURRENT confirms it.
         """
-        telemetry, sent_at, before = self._telemetry, now, self._telemetry.current
-        plan = telemetry.plan_id
+        mission, sent_at, before = self._telemetry.mission, now, self._telemetry.mission.current
+        plan = mission.plan_id
         self._seq, self.current_set_at[seq] = seq, now
 
         def executed() -> bool:
-            if telemetry.current is None or telemetry.current_at < sent_at:
+            if mission.current is None or mission.current_at < sent_at:
                 return False
             # points may be passed faster than they are reported; `before` is of its own plan
-            return telemetry.current == seq or (before is not None and seq < telemetry.current
-                                                and (before <= seq or telemetry.plan_id != plan))
+            return mission.current == seq or (before is not None and seq < mission.current
+                                              and (before <= seq or mission.plan_id != plan))
 
         # an item that was reported before is reported without the command too: it needs its ACK
         reported = before == seq
         message = Command(_SET_CURRENT, self._peer.set_current(seq), executed)
         command = Command(
             _SET_CURRENT, self._peer.command(d.MAV_CMD_DO_SET_MISSION_CURRENT, seq),
-            lambda: not (reported and telemetry.plan_id == plan) and executed(),
+            lambda: not (reported and mission.plan_id == plan) and executed(),
             attempts=_SET_ATTEMPTS if reported else 2, fallback=message)
         return self.start(command if self._profile.jump_command else message, now, completion)
 

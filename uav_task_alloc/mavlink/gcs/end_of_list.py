@@ -164,10 +164,10 @@ class EndOfList:
         """
         telemetry, progress = self._telemetry, self._onboard.progress
         tasks, seq = self._onboard.tasks, len(progress.items) - 1 + self._onboard.own
-        complete = telemetry.mission_state == d.MISSION_STATE_COMPLETE
+        complete = telemetry.mission.state == d.MISSION_STATE_COMPLETE
         self._stays = self._stays and complete
         if self._stays or not complete or self._profile.atomic or (
-                telemetry.mode is not ModeFunction.MISSION or telemetry.current != seq
+                telemetry.mode is not ModeFunction.MISSION or telemetry.mission.current != seq
                 or not progress.finished or progress.returns or tasks is None or tasks.stops):
             return []
 

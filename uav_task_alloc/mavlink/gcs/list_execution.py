@@ -152,13 +152,13 @@ class ListExecution:
         """
         telemetry, progress = self._telemetry, self._onboard.progress
         last = len(progress.items) - 1
-        return (telemetry.airborne and telemetry.mission_state == d.MISSION_STATE_UNKNOWN
-                and telemetry.current == progress.current == last)
+        return (telemetry.airborne and telemetry.mission.state == d.MISSION_STATE_UNKNOWN
+                and telemetry.mission.current == progress.current == last)
 
     def _current_unreported(self, now: float) -> bool:
         """Whether no current item came since the mode has just changed in the air."""
         telemetry = self._telemetry
-        return telemetry.airborne and telemetry.current_at <= telemetry.mode_at and (
+        return telemetry.airborne and telemetry.mission.current_at <= telemetry.mode_at and (
             now - telemetry.mode_at < _REPORT_DELAY)
 
     def _set_back_late(self, now: float) -> bool:
@@ -181,9 +181,10 @@ class ListExecution:
         It does not either where the current item was set after the end.
         """
         telemetry, onboard, progress = self._telemetry, self._onboard, self._onboard.progress
-        if self._profile.atomic or telemetry.current is None or progress.finished or (
-                progress.active is None or telemetry.current_at <= onboard.mission.verified_at):
+        report = telemetry.mission
+        if self._profile.atomic or report.current is None or progress.finished or (
+                progress.active is None or report.current_at <= onboard.mission.verified_at):
             return False
-        return (telemetry.mission_stopped and telemetry.airborne) or (
-            telemetry.mission_state == d.MISSION_STATE_COMPLETE
-            and telemetry.current - self._onboard.own < len(progress.items) - 1)
+        return (report.stopped and telemetry.airborne) or (
+            report.state == d.MISSION_STATE_COMPLETE
+            and report.current - onboard.own < len(progress.items) - 1)

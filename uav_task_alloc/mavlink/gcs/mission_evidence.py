@@ -39,8 +39,8 @@ class MissionEvidence:
     def rejected(self, now: float) -> bool:
         """Whether the vehicle reports no valid mission just after it accepted ours (PX4)."""
         telemetry, onboard = self._telemetry, self._onboard
-        return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
-                and now - telemetry.current_at < LATE_REACHED
+        return (telemetry.mission.state == d.MISSION_STATE_NO_MISSION
+                and now - telemetry.mission.current_at < LATE_REACHED
                 and (onboard.latest_upload.taken
                      or now - onboard.mission.verified_at < LATE_REACHED))
 

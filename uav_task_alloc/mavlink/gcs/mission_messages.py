@@ -61,11 +61,11 @@ class MissionMessages:
             self._onboard.resume.note_current(seq, now, self._telemetry.frame)
             if self._onboard.item_to_set.seq is None:  # else seq is of the previous mission
                 progress.note_current(seq, now, flying, self._telemetry.frame,
-                                      self._telemetry.mission_restarted,
+                                      self._telemetry.mission.restarted,
                                       self._telemetry.showed_mission)
             elif flying:
                 self._onboard.item_to_set.note_flown(seq, now)
-            ended = self._telemetry.mission_ended and self._onboard.item_to_set.seq is None
+            ended = self._telemetry.mission.ended and self._onboard.item_to_set.seq is None
             may_have_ended = flying or ended if not self._atomic else (  # PX4: take-off too
                 self._telemetry.airborne_since_mission and progress.may_have_ended_unseen(seq))
             if may_have_ended and message.mission_state == d.MISSION_STATE_COMPLETE:

@@ -328,7 +328,8 @@ class OnboardMission:
         self.resume.flown.keep()
         if self._correct(held, now):
             return
-        (items, since), seq = self.resume.read_again(held, self.tasks), self._telemetry.current
+        items, since = self.resume.read_again(held, self.tasks)
+        seq = self._telemetry.mission.current
         self.progress.begin(items, None if seq is None or not held else max(0, seq - self.own),
                             now, read=True, since=since)
 

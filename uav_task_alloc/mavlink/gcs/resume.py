@@ -126,8 +126,8 @@ class Resume:
             read_at: steady time [s] at which they were read.
             now: steady time [s].
         """
-        telemetry = self._telemetry
-        if self.located or not held or (telemetry.current is not None and telemetry.has_position):
+        telemetry, current = self._telemetry, self._telemetry.mission.current
+        if self.located or not held or (current is not None and telemetry.has_position):
             return False
         return telemetry.airborne or self._passed_unlocated(held) or (
             not telemetry.grounded and now - read_at < _LANDED_STATE_DELAY)
@@ -147,8 +147,8 @@ class Resume:
             tasks: the present list.
             now: steady time [s].
         """
-        telemetry = self._telemetry
-        if self.located or not held or telemetry.current is None:
+        telemetry, reported = self._telemetry, self._telemetry.mission.current
+        if self.located or not held or reported is None:
             self.located = self.located or not held
             return
         self._begin(held, now)
@@ -163,7 +163,7 @@ class Resume:
             self._begin_nowhere(held, now)
             return
         # not by REACHED: PX4 repeats that of the previous mission for some seconds
-        current = min(max(0, telemetry.current - self._profile.rules.home_first), len(held))
+        current = min(max(0, reported - self._profile.rules.home_first), len(held))
         if not self._profile.atomic and self._progress.items:  # REACHED was received first
             current = max(current, self._progress.current or 0)
         ended = self._ended(held, current)
@@ -306,7 +306,7 @@ class Resume:
 
     def _ended(self, held: tuple[Item, ...], current: int) -> bool:
         telemetry, last = self._telemetry, held[-1]
-        if telemetry.mission_state != d.MISSION_STATE_COMPLETE:
+        if telemetry.mission.state != d.MISSION_STATE_COMPLETE:
             return False  # a pilot may have set HOLD just before the last item, or at it
         if not self._profile.atomic:
             return True  # PX4 reports it after a take-off and a landing too

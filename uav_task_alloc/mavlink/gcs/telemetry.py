@@ -12,18 +12,17 @@ from uav_task_alloc.mavlink.autopilots import OFF_GROUND, ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.battery_level import BatteryLevel
 from uav_task_alloc.mavlink.gcs.boot_clock import BootClock
 from uav_task_alloc.mavlink.gcs.link_times import LinkTimes
+from uav_task_alloc.mavlink.gcs.mission_report import MissionReport
+from uav_task_alloc.mavlink.gcs.newest_reports import NewestReports
+from uav_task_alloc.mavlink.gcs.position_validity import PositionValidity
 from uav_task_alloc.mavlink.gcs.status_texts import failing_checks
-from uav_task_alloc.mavlink.gcs.telemetry_messages import ESTIMATE, STATE_REPORTS
+from uav_task_alloc.mavlink.gcs.telemetry_messages import ESTIMATE
 from uav_task_alloc.mavlink.gcs.two_vehicles import TwoVehicles
-from uav_task_alloc.mavlink.transport.codec import Message, plan_id
+from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
 
 DISARM_PAUSE = 3.0  # [s] after a disarming in which a fall shows, and nothing is armed
-_IN_MISSION = 1  # MISSION_CURRENT.mission_mode; 0: not known
-_NOT_FLOWN = {d.MISSION_STATE_NOT_STARTED, d.MISSION_STATE_PAUSED}  # ArduPilot sends the first
-_ORDERED = 5.0  # [s] in which the numbers of two frames order them
-_REPORTED = 3.0  # [s] until a vehicle without estimator or GPS reports is trusted
 _IN_AIR = frozenset({
     d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING})
 _SIMULATED = 2.0  # seconds of its clock in one of this program: a simulator that runs faster
@@ -61,14 +60,8 @@ class Telemetry:
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
         self.unhealthy = ''  # text on failing prearm checks; '': none reported
-        self.current: int | None = None  # seq on the wire
-        self.current_at = -math.inf  # [s] of it
-        self.reached: int | None = None  # seq on the wire, latest
-        self.total: int | None = None  # number of items as the vehicle reports it
-        self.mission_state = self.plan_id = 0  # MISSION_STATE; PX4's id of the onboard mission
-        self._mode_frame = self._in_mission_frame = 0  # numbers; shows the mode, MISSION (CURRENT)
-        self.mission_restarted = self.mission_ended = False  # by reports
-        self.mission_stopped = self._was_stopped = False
+        self.mission = MissionReport(profile.atomic)
+        self._mode_frame = 0  # number of the one that shows the mode
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
         self.restarts, self.booted_at = 0, -math.inf  # how many; [s] the latest, or earlier
@@ -76,10 +69,9 @@ class Telemetry:
         self.clock_rate = self._boot_clock.rate
         self.frames = FrameLog()
         self.frame = 0  # frame number of the latest message
-        self._newest: dict[str, tuple[int, float]] = {}  # number of a frame and time [s] by type
-        self._first_at: float | None = None  # [s] of the first position
-        # of its position; it has finished booting; was on the ground since it was in mission mode
-        self._fix = self._estimates = self._started = self._landed_since_mission = False
+        self._newest, self._validity = NewestReports(), PositionValidity()
+        # it has finished booting; was on the ground since it was in mission mode
+        self._started = self._landed_since_mission = False
         self.has_position = False  # valid by its estimator or its GPS
         self._handlers = self._message_handlers()
 
@@ -89,9 +81,9 @@ class Telemetry:
             'HEARTBEAT': self._heartbeat, 'GLOBAL_POSITION_INT': self._global_position,
             'HOME_POSITION': self._home, 'BATTERY_STATUS': self._level.take_battery,
             'SYS_STATUS': self._sys_status, 'EXTENDED_SYS_STATE': self._extended,
-            'MISSION_CURRENT': self._current, 'MISSION_ITEM_REACHED': self._reached,
-            'GPS_RAW_INT': self._gps, 'EKF_STATUS_REPORT': self._estimate,
-            'ESTIMATOR_STATUS': self._estimate}
+            'MISSION_CURRENT': self._current, 'GPS_RAW_INT': self._validity.take_gps,
+            'EKF_STATUS_REPORT': self._validity.take_estimate,
+            'ESTIMATOR_STATUS': self._validity.take_estimate}
 
     @property
     def boot_ms(self) -> int:
@@ -115,7 +107,7 @@ class Telemetry:
     @property
     def airborne(self) -> bool:
         """Armed and off the ground."""
-        return self.armed and (self.height > OFF_GROUND or self.landed in _IN_AIR)
+        return self.armed and self.off_ground
 
     @property
     def airborne_since_mission(self) -> bool:
@@ -148,17 +140,17 @@ class Telemetry:
     def in_mission(self) -> bool:
         """Whether it is in mission mode, by the newest heartbeat or MISSION_CURRENT."""
         return (self.mode is ModeFunction.MISSION
-                or self._in_mission_frame > self._mode_frame)
+                or self.mission.in_mission_frame > self._mode_frame)
 
     @property
     def shows_mission(self) -> bool:
         """Whether the latest message is a MISSION_CURRENT that shows mission mode."""
-        return self._in_mission_frame == self.frame > self._mode_frame
+        return self.mission.in_mission_frame == self.frame > self._mode_frame
 
     @property
     def showed_mission(self) -> bool:
         """Whether the latest message is a MISSION_CURRENT sent before mission mode was left."""
-        return self._in_mission_frame == self.frame <= self._mode_frame
+        return self.mission.in_mission_frame == self.frame <= self._mode_frame
 
     @property
     def past_boot(self) -> bool:
@@ -222,7 +214,7 @@ class Telemetry:
         self.frame = self.frames.note(message.get_seq(), now)
         self.received_ids.add(message.get_msgId())
         self.received_last[message.get_msgId()] = now
-        if message.get_type() in STATE_REPORTS and not self._is_newest(message, now):
+        if self._newest.is_outdated(message, self.frame, now):
             if message.get_type() == 'GLOBAL_POSITION_INT' and self.has_position:
                 self._compare(message, now, late=True)
             return False
@@ -242,27 +234,14 @@ class Telemetry:
         self.restarts += 1
         self.received_ids = set()
         self.received_last.clear()
-        self.current, self.total, self.plan_id, self.mission_state = None, None, 0, 0
-        self._mode_frame = self._in_mission_frame = 0
-        self.home, self.height, self.reached = None, math.nan, None
+        self._mode_frame = 0
+        self.home, self.height = None, math.nan
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
-        self.has_position = self._fix = self._estimates = False
-        self._first_at, self._started = None, False
-        self._newest.clear()
+        self.has_position = self._started = False
+        for part in (self.mission, self._validity, self._newest):
+            part.forget()
         self.frames.clear()
         self._level.restart()
-
-    def _is_newest(self, message: Message, now: float) -> bool:
-        """By the number of its frame: links may deliver out of order.
-
-        Not by its sequence number: hundreds of frames may come between two of a type.
-        """
-        kind = message.get_type() + str(getattr(message, 'id', ''))
-        newest, received_at = self._newest.get(kind, (self.frame, now))
-        if now - received_at < _ORDERED and self.frame < newest:
-            return False
-        self._newest[kind] = self.frame, now
-        return True
 
     def _heartbeat(self, message: Message, now: float) -> None:
         self.link.heartbeat_at = now
@@ -291,7 +270,8 @@ class Telemetry:
 
     def _global_position(self, message: Message, now: float) -> None:
         self.positions_at = now
-        self.has_position = (message.lat, message.lon) != (0, 0) and self._is_valid(now)
+        self.has_position = (message.lat, message.lon) != (0, 0) and (
+            self._validity.is_valid(self.autopilot, self.received_ids, now))
         if not self.has_position:
             return
         self.altitude = message.alt * 1e-3
@@ -319,23 +299,6 @@ class Telemetry:
         velocity = (message.vy * 0.01, message.vx * 0.01, -message.vz * 0.01)
         return self._converted[1], velocity
 
-    def _is_valid(self, now: float) -> bool:
-        """Valid by its estimator, else by a GPS fix; trusted after _REPORTED without either."""
-        if self._first_at is None:
-            self._first_at = now
-        if ESTIMATE.get(self.autopilot) in self.received_ids:
-            return self._estimates
-        if d.MAVLINK_MSG_ID_GPS_RAW_INT in self.received_ids:
-            return self._fix
-        return now - self._first_at >= _REPORTED
-
-    def _gps(self, message: Message, now: float) -> None:
-        self._fix = message.fix_type >= d.GPS_FIX_TYPE_3D_FIX
-
-    def _estimate(self, message: Message, now: float) -> None:
-        # EKF_POS_HORIZ_ABS and ESTIMATOR_POS_HORIZ_ABS are the same bit
-        self._estimates = bool(message.flags & d.EKF_POS_HORIZ_ABS)
-
     def _home(self, message: Message, now: float) -> None:
         if (message.latitude, message.longitude) == (0, 0):
             return  # not known, as in GLOBAL_POSITION_INT
@@ -356,21 +319,4 @@ class Telemetry:
         self._landed_since_mission = self._landed_since_mission or self.grounded
 
     def _current(self, message: Message, now: float) -> None:
-        self.current, self.current_at = message.seq, now
-        self.total = message.total if 0 < message.total < 65535 else None
-        before, self.mission_state = self.mission_state, message.mission_state
-        if not self._profile.atomic:  # PX4: by a take-off too
-            complete = d.MISSION_STATE_COMPLETE
-            self.mission_restarted = before == complete and (
-                self.mission_state == d.MISSION_STATE_ACTIVE)
-            self.mission_ended = self.mission_state == complete and (
-                before not in (complete, d.MISSION_STATE_UNKNOWN))
-            # not flown, though it is in mission mode; one report may be of the moment it began
-            stopped = self.mission_state in _NOT_FLOWN and message.mission_mode == _IN_MISSION
-            self.mission_stopped, self._was_stopped = stopped and self._was_stopped, stopped
-            if message.mission_mode == _IN_MISSION:
-                self._in_mission_frame = self.frame
-        self.plan_id = plan_id(message)
-
-    def _reached(self, message: Message, now: float) -> None:
-        self.reached = message.seq
+        self.mission.receive(message, self.frame, now)

@@ -102,7 +102,7 @@ class UnreadReports:
         if not located and len(self.currents) < _MAX_CURRENTS:
             self.currents.append(UnreadCurrent(
                 seq, now, frame, self._telemetry.in_mission,
-                self._telemetry.mission_state == d.MISSION_STATE_COMPLETE, self._count_flown(),
+                self._telemetry.mission.state == d.MISSION_STATE_COMPLETE, self._count_flown(),
                 self._telemetry.mode is ModeFunction.HOLD))
         self._drop_replaced()
         for reached in self._reached:
@@ -112,7 +112,7 @@ class UnreadReports:
 
     def _drop_replaced(self) -> None:
         """Drop each REACHED of a PX4 whose mission was replaced since, by its number of items."""
-        before, stored = self._stored, self._telemetry.total
+        before, stored = self._stored, self._telemetry.mission.total
         self._stored = before if stored is None else stored
         if self._repeats and before not in (None, self._stored):
             self._reached.clear()
@@ -120,8 +120,8 @@ class UnreadReports:
     def _count_flown(self) -> int | None:
         """How many items the mission has that the newest MISSION_CURRENT reports to be flown."""
         telemetry = self._telemetry
-        return telemetry.total if telemetry.in_mission and (
-            telemetry.mission_state == d.MISSION_STATE_ACTIVE) else None
+        return telemetry.mission.total if telemetry.in_mission and (
+            telemetry.mission.state == d.MISSION_STATE_ACTIVE) else None
 
     def note_reached(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_ITEM_REACHED.
