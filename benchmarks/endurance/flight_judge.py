@@ -288,7 +288,7 @@ class Judge:
             self.taken_at = None
 
     def _take(self, when: float) -> None:
-        if self.world.vehicle.flight.system_status < d.MAV_STATE_STANDBY:
+        if self.world.vehicle.flight.boot.booting:
             return  # booting: a mode is no intervention
         if self.taken_at is None:
             self.taken_at, self.known_at = when, None

@@ -45,7 +45,7 @@ def judged(rows, hand_over_at=-1.0, late=0.0, kind='px4'):
     flight = SimpleNamespace(
         body=SimpleNamespace(position=AWAY, velocity=(0.0, 0.0, 0.0)), custom_mode=0, seq=0,
         booted=0.0, mode=FlightMode.HOLD, items=[], landed=True, track=None, armed=False,
-        system_status=d.MAV_STATE_STANDBY)
+        boot=SimpleNamespace(booting=False))
     world = SimpleNamespace(now=0.0, vehicle=SimpleNamespace(flight=flight), events=[],
                             tasks=None, state=None, authority=AuthorityState.UNKNOWN)
     judge = Judge(world, kind, {'A': PLACE, 'B': AWAY})

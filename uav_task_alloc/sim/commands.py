@@ -62,20 +62,20 @@ class Commands:
 
     def note(self, command: int, params: CommandParams, station: str) -> None:
         """Record a command about mode, arming, take-off or mission in the ground truth."""
-        flight, modes = self.flight, self.flight.custom_modes
+        truth, modes = self.flight.truth, self.flight.custom_modes
         if command == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
             forced = 'forced ' if params[1] == _FORCE else ''
             name = forced + ('arm' if params[0] == 1.0 else 'disarm')
-            flight.note('command', command=name, cause=station)
+            truth.note('command', command=name, cause=station)
         elif command == dialect.MAV_CMD_DO_SET_MODE:
-            flight.note('command', command='mode', mode=self.custom_mode(params), cause=station)
+            truth.note('command', command='mode', mode=self.custom_mode(params), cause=station)
         elif command in _MODE_COMMANDS:
-            flight.note('command', command='mode', mode=modes[_MODE_COMMANDS[command]],
-                        cause=station)
+            truth.note('command', command='mode', mode=modes[_MODE_COMMANDS[command]],
+                       cause=station)
         elif command == dialect.MAV_CMD_DO_SET_MISSION_CURRENT:
-            flight.note('command', command='set current', seq=int(params[0]), cause=station)
+            truth.note('command', command='set current', seq=int(params[0]), cause=station)
         elif command in _PLAIN_COMMANDS:
-            flight.note('command', command=_PLAIN_COMMANDS[command], cause=station)
+            truth.note('command', command=_PLAIN_COMMANDS[command], cause=station)
 
     def custom_mode(self, params: CommandParams) -> int:
         """The custom mode that DO_SET_MODE commands."""

@@ -75,13 +75,13 @@ class Interventions:
     def rc_mode(self, custom_mode: int) -> bool:
         """The pilot's mode switch; False where the autopilot does not enter that mode."""
         self.flight.has_radio = True
-        with self.flight.caused_by('pilot'):
+        with self.flight.truth.caused_by('pilot'):
             return self.flight.set_custom_mode(custom_mode)
 
     def rc_arm(self, armed: bool, force: bool = False) -> bool:
         """The pilot's arm switch; False where it is refused. A forced disarm in the air falls."""
         self.flight.has_radio = True
-        with self.flight.caused_by('pilot'):
+        with self.flight.truth.caused_by('pilot'):
             return self.flight.arm(force) if armed else self.flight.disarm(force)
 
     def rc_stick(self, velocity: Point | None) -> None:
@@ -105,9 +105,9 @@ class Interventions:
         name = flight.modes[flight.custom_mode if mode is None else mode].name
         flight.texts += [(severity, text.format(mode=name))
                          for severity, text in self._texts.begin[kind]]
-        flight.note('failsafe', cause=kind, mode=mode)
+        flight.truth.note('failsafe', cause=kind, mode=mode)
         if mode is not None:
-            with flight.caused_by('failsafe'):
+            with flight.truth.caused_by('failsafe'):
                 flight.set_custom_mode(mode)
 
     def failsafe_over(self) -> None:
@@ -120,29 +120,29 @@ class Interventions:
             del flight.failsafes[kind]
             if kind in self._texts.cleared:
                 flight.texts.append(self._texts.cleared[kind])
-            flight.note('failsafe_over', cause=kind)
+            flight.truth.note('failsafe_over', cause=kind)
 
     def kill_switch(self) -> None:
         """The pilot stops the motors, also in the air; disarmed until `kill_switch_off`."""
         flight = self.flight
         flight.terminated = True
         flight.texts.append(self._texts.kill)
-        flight.note('kill_switch', cause='pilot')
-        with flight.caused_by('pilot'):
+        flight.truth.note('kill_switch', cause='pilot')
+        with flight.truth.caused_by('pilot'):
             flight.disarm(force=True)
 
     def kill_switch_off(self) -> None:
         """The pilot releases the kill switch; nothing arms automatically."""
         self.flight.terminated = False
         self.flight.texts.append(self._texts.kill_cleared)
-        self.flight.note('kill_switch_off', cause='pilot')
+        self.flight.truth.note('kill_switch_off', cause='pilot')
 
     def avoid(self, active: bool) -> None:
         """Begin or end an avoidance (ArduPilot): AVOID_ADSB, then the mode before if unchanged."""
         flight = self.flight
         if not self._is_ardupilot or active is (_ADSB in flight.failsafes):
             return
-        with flight.caused_by('failsafe'):
+        with flight.truth.caused_by('failsafe'):
             if active:
                 flight.failsafes[_ADSB] = None
                 flight.texts.append((_ALERT, 'Avoid: Performing action: 4'))
@@ -157,4 +157,4 @@ class Interventions:
     def glitch(self, offset: Point, seconds: float) -> None:
         """Shift the reported, not the true position by `offset` [m] ENU for some `seconds`."""
         self.estimate.glitch(offset, seconds)
-        self.flight.note('glitch')
+        self.flight.truth.note('glitch')

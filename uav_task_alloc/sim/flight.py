@@ -2,8 +2,7 @@
 """Flight of a simulated autopilot: modes, arming, and the mission read from its storage."""
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -11,12 +10,13 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.model import Point
 from uav_task_alloc.sim import stored_item as item_
 from uav_task_alloc.sim.boot import Boot, BootTimes
-from uav_task_alloc.sim.config import FlightMode, StorageChange, TruthEvent, VehicleConfig
+from uav_task_alloc.sim.config import FlightMode, StorageChange, VehicleConfig
 from uav_task_alloc.sim.dynamics import Track
 from uav_task_alloc.sim.modes import CustomMode
 from uav_task_alloc.sim.navigation import Navigation
 from uav_task_alloc.sim.payload import Payload
 from uav_task_alloc.sim.stored_item import StoredItem
+from uav_task_alloc.sim.truth_log import TruthLog
 
 _MAX_STEP = 0.1  # [s] of the body
 _MAX_STRIDE = 1.0  # [m] of the body in one step: well inside the acceptance radius
@@ -30,7 +30,7 @@ INFO = dialect.MAV_SEVERITY_INFO
 class VehicleFlight(Navigation):
     """Behaviour of both autopilots; subclasses handle a changed mission and its end.
 
-    The owner sends and clears `reached` and `texts`; `events` are the ground truth.
+    The owner sends and clears `reached` and `texts`; `truth` is the ground truth.
 
     Args:
         config: of the vehicle.
@@ -44,7 +44,6 @@ class VehicleFlight(Navigation):
         point: target of the item [m] ENU.
         force: as of MAV_CMD_COMPONENT_ARM_DISARM.
         reason: text of the autopilot.
-        name, cause, command: of an event of the ground truth.
     """
 
     modes: ClassVar[dict[int, CustomMode]]  # by custom_mode
@@ -59,8 +58,8 @@ class VehicleFlight(Navigation):
         self.boot = Boot(config, self.boot_times)
         self.reached: list[int] = []
         self.texts: list[tuple[int, str]] = []
-        self.events: list[TruthEvent] = []
-        self.payload = Payload(lambda name, text: self.note(name, command=text))
+        self.truth = TruthLog(lambda: (self.now, self.body.position))
+        self.payload = Payload(lambda name, text: self.truth.note(name, command=text))
         self.arming_fault = ''  # an injected reason to refuse arming; '': none
         self.terminated = False  # the kill switch is on
         self.stick: Point | None = None  # [m/s] ENU commanded by the pilot
@@ -68,14 +67,13 @@ class VehicleFlight(Navigation):
         self.now = 0.0  # [s]
         self.custom_mode = self.custom_modes[self.start_mode]
         self.armed, self.landed = False, True
-        self._cause = 'self'
         self.reboot(0.0)
 
     def reboot(self, now: float) -> None:
         """Reset to power-up: disarmed, at the start of the mission; in the air it falls."""
         self.now = self.booted = now
         self.boot.elapsed = 0.0
-        self.note('reboot')
+        self.truth.note('reboot')
         self.payload.reset()
         self.body.fixed_heading = None
         self._set_number(self.custom_modes[self.start_mode])
@@ -96,50 +94,9 @@ class VehicleFlight(Navigation):
         return self.modes[self.custom_mode].mode
 
     @property
-    def lands_by_item(self) -> bool:
-        """Whether it flies a NAV_LAND item."""
-        return (self.mode is FlightMode.MISSION and self.track is not None
-                and self.seq < len(self.items) and self.items[self.seq].command == item_.LAND)
-
-    @property
-    def landed_state(self) -> int:
-        """MAV_LANDED_STATE.
-
-        ArduCopter: `is_landing` and `is_taking_off` of its mode; PX4: the type of its setpoint.
-        """
-        if self.landed:
-            return int(dialect.MAV_LANDED_STATE_ON_GROUND)
-        if self.mode is FlightMode.LAND or self.lands_by_item or (
-                self.track is not None and self.track.descends):
-            return int(dialect.MAV_LANDED_STATE_LANDING)
-        if self.mode is FlightMode.TAKEOFF or (self.track is not None and self.track.takes_off):
-            return int(dialect.MAV_LANDED_STATE_TAKEOFF)
-        return int(dialect.MAV_LANDED_STATE_IN_AIR)
-
-    @property
     def positioned(self) -> bool:
         """Whether there is a position estimate, without which it does not arm."""
         return self.boot.positioned
-
-    @property
-    def system_status(self) -> int:
-        """MAV_STATE."""
-        if self.boot.booting:
-            return self.boot_states[0 if self.boot.initialising else 1]
-        if self.terminated:
-            return int(dialect.MAV_STATE_FLIGHT_TERMINATION)
-        if self.failsafes:
-            return int(dialect.MAV_STATE_CRITICAL)
-        return int(dialect.MAV_STATE_STANDBY if self.landed else dialect.MAV_STATE_ACTIVE)
-
-    @contextmanager
-    def caused_by(self, cause: str) -> Iterator[None]:
-        """Record events within the context with this cause instead of `self`."""
-        before, self._cause = self._cause, cause
-        try:
-            yield
-        finally:
-            self._cause = before
 
     # commands
 
@@ -151,7 +108,7 @@ class VehicleFlight(Navigation):
             return False
         if not self.armed:
             self.armed, self._idle_since = True, self.now
-            self.note('armed', cause=self._cause)
+            self.truth.note('armed', cause=self.truth.cause)
         return True
 
     def _never_arms(self) -> str:
@@ -188,11 +145,11 @@ class VehicleFlight(Navigation):
     def _stop_motors(self) -> None:
         if self.armed:
             self.armed = False
-            self.note('disarmed', cause=self._cause)
+            self.truth.note('disarmed', cause=self.truth.cause)
         if not self.landed and self._fall_speed == 0.0:
             self.track = None
             self._fall_speed = max(1.0, (self.body.position[2] - self.home[2]) / _FALL)
-            self._fall_cause = self._cause
+            self._fall_cause = self.truth.cause
 
     def takeoff(self, height: float) -> bool:
         """Climb to `height` [m] ENU from the ground."""
@@ -225,7 +182,7 @@ class VehicleFlight(Navigation):
     def _set_number(self, number: int) -> None:
         if number != self.custom_mode:
             self.custom_mode = number
-            self.note('mode', mode=number, cause=self._cause)
+            self.truth.note('mode', mode=number, cause=self.truth.cause)
 
     def can_fly_mission(self) -> bool:
         """Whether the mission mode can be entered now; a text reports why not."""
@@ -276,7 +233,7 @@ class VehicleFlight(Navigation):
         self.body.fall(dt, self._fall_speed)
         if self.body.position[2] <= self.home[2]:
             self._touch_down()
-            self.note('crashed', cause=self._fall_cause)
+            self.truth.note('crashed', cause=self._fall_cause)
 
     def settle_on_ground(self) -> None:
         """Put it on the ground below its position."""
@@ -297,7 +254,7 @@ class VehicleFlight(Navigation):
                 self._stay()
                 return
             self.landed = False
-            self.note('takeoff')
+            self.truth.note('takeoff')
         if stick is None:
             self._follow(dt)
         else:
@@ -305,7 +262,7 @@ class VehicleFlight(Navigation):
         self.payload.step(self.body.position, self.now)
         if self.body.battery <= 0.0 and self.mode is not FlightMode.LAND and not self.landed:
             self.texts.append((CRITICAL, 'Battery empty: landing'))
-            with self.caused_by('failsafe'):
+            with self.truth.caused_by('failsafe'):
                 self.set_mode(FlightMode.LAND)
 
     def override_sticks(self) -> None:
@@ -363,20 +320,13 @@ class VehicleFlight(Navigation):
 
     def change_speed(self, speed: float) -> None:
         super().change_speed(speed)
-        self.note('speed', command=f'{self.speed:g}')
+        self.truth.note('speed', command=f'{self.speed:g}')
 
     def turn_to(self, compass: float) -> None:
         super().turn_to(compass)
-        self.note('yaw', command=f'{compass:g}')
+        self.truth.note('yaw', command=f'{compass:g}')
 
     def report_reached(self, seq: int, point: Point) -> None:
         """Send MISSION_ITEM_REACHED, and record it in the ground truth."""
         self.reached.append(seq)
-        self.events.append(TruthEvent(self.now, 'item_reached', point, seq))
-
-    def note(self, name: str, *, seq: int | None = None, mode: int | None = None,
-             cause: str = '', command: str = '') -> None:
-        """Record an event at the present position in the ground truth."""
-        self.events.append(
-            TruthEvent(self.now, name, self.body.position, seq, mode, cause, command)
-        )
+        self.truth.note('item_reached', point=point, seq=seq)

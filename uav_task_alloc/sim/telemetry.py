@@ -12,6 +12,7 @@ from uav_task_alloc.sim.batteries import SimBatteries
 from uav_task_alloc.sim.config import FlightMode
 from uav_task_alloc.sim.estimate import Estimate
 from uav_task_alloc.sim.flight import VehicleFlight
+from uav_task_alloc.sim.stored_item import LAND
 from uav_task_alloc.sim.streams import Maker
 
 _CAPABILITIES = (dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -62,7 +63,18 @@ class TelemetryMessages:
         base |= dialect.MAV_MODE_FLAG_AUTO_ENABLED if flight.mode is FlightMode.MISSION else 0
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR, self._autopilot, base, flight.custom_mode,
-            flight.system_status, 3)
+            self._system_status(), 3)
+
+    def _system_status(self) -> int:
+        """MAV_STATE."""
+        flight = self._flight
+        if flight.boot.booting:
+            return flight.boot_states[0 if flight.boot.initialising else 1]
+        if flight.terminated:
+            return int(dialect.MAV_STATE_FLIGHT_TERMINATION)
+        if flight.failsafes:
+            return int(dialect.MAV_STATE_CRITICAL)
+        return int(dialect.MAV_STATE_STANDBY if flight.landed else dialect.MAV_STATE_ACTIVE)
 
     def global_position(self) -> Message | None:
         body, heading = self._flight.body, self._course() % 360 * 100
@@ -139,7 +151,29 @@ class TelemetryMessages:
             self.batteries.percent(0), 0, 0, 0, 0, 0, 0)
 
     def extended_sys_state(self) -> Message:
-        return dialect.MAVLink_extended_sys_state_message(0, self._flight.landed_state)
+        return dialect.MAVLink_extended_sys_state_message(0, self._landed_state())
+
+    def _landed_state(self) -> int:
+        """MAV_LANDED_STATE.
+
+        ArduCopter: `is_landing` and `is_taking_off` of its mode; PX4: the type of its setpoint.
+        """
+        flight, track = self._flight, self._flight.track
+        if flight.landed:
+            return int(dialect.MAV_LANDED_STATE_ON_GROUND)
+        if flight.mode is FlightMode.LAND or self._lands_by_item() or (
+                track is not None and track.descends):
+            return int(dialect.MAV_LANDED_STATE_LANDING)
+        if flight.mode is FlightMode.TAKEOFF or (track is not None and track.takes_off):
+            return int(dialect.MAV_LANDED_STATE_TAKEOFF)
+        return int(dialect.MAV_LANDED_STATE_IN_AIR)
+
+    def _lands_by_item(self) -> bool:
+        """Whether it flies a NAV_LAND item."""
+        flight = self._flight
+        return (flight.mode is FlightMode.MISSION and flight.track is not None
+                and flight.seq < len(flight.items)
+                and flight.items[flight.seq].command == LAND)
 
     def home_position(self) -> Message | None:
         if not self._flight.positioned:

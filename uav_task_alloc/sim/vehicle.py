@@ -101,7 +101,7 @@ class Vehicle(Interventions):
             'RC_CHANNELS_OVERRIDE': self._override_sticks,
         }
         self.reboot(now)
-        self.flight.events.clear()
+        self.flight.truth.take()
 
     def _add_fence(self) -> None:
         """Have stores for a fence and rally points, unless the capacity is 0."""
@@ -144,7 +144,7 @@ class Vehicle(Interventions):
         """Stop all messages and motion."""
         if self.alive:
             self.alive = False
-            self.flight.note('died')
+            self.flight.truth.note('died')
 
     def revive(self, now: float) -> None:
         """Boot on the ground below the position where it died."""
@@ -160,8 +160,7 @@ class Vehicle(Interventions):
 
     def take_events(self) -> list[TruthEvent]:
         """Return the events since the last call, and clear them."""
-        events, self.flight.events = self.flight.events, []
-        return events
+        return self.flight.truth.take()
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Handle a message at vehicle time `now` [s]; returns the messages to send."""
@@ -174,7 +173,7 @@ class Vehicle(Interventions):
             return self._drain()
         if message.target_system not in (self.config.system_id, 0):
             return []
-        with self.flight.caused_by(_station(message)):
+        with self.flight.truth.caused_by(_station(message)):
             answers = handler(message)
         return answers + self._drain()
 
@@ -197,11 +196,11 @@ class Vehicle(Interventions):
     def _change_battery(self, now: float) -> None:
         power = self._battery_change.step(now)
         if power == 'off':
-            self.flight.note('power_off')
+            self.flight.truth.note('power_off')
         elif power == 'on':
             self.flight.body.battery = 1.0
             self.flight.now = now
-            self.flight.note('battery_changed')
+            self.flight.truth.note('battery_changed')
             self.reboot(now)
 
     def _drain(self) -> list[Message]:
@@ -246,7 +245,7 @@ class Vehicle(Interventions):
         return [ack, *requested]
 
     def _set_mode(self, m: Message) -> list[Message]:
-        self.flight.note('command', command='mode', mode=m.custom_mode, cause=_station(m))
+        self.flight.truth.note('command', command='mode', mode=m.custom_mode, cause=_station(m))
         self.flight.set_custom_mode(m.custom_mode)
         return []
 
@@ -264,7 +263,7 @@ class Vehicle(Interventions):
     def _set_current(self, m: Message) -> list[Message]:
         if m.target_component not in (AUTOPILOT_COMPONENT, 0):
             return []
-        self.flight.note('command', command='set current', seq=m.seq, cause=_station(m))
+        self.flight.truth.note('command', command='set current', seq=m.seq, cause=_station(m))
         return [self._mission_current()] if self.mission.set_current(m.seq) else []
 
 

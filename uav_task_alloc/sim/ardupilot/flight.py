@@ -213,7 +213,7 @@ class ArduPilotFlight(VehicleFlight):
             self._carry_out(commands[0])
         if flown is None:
             self.run = MissionRunState.COMPLETE
-            self.note('mission_end')
+            self.truth.note('mission_end')
             return
         self._upcoming = flown + 1
         self.begin_item(flown)

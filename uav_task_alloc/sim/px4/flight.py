@@ -88,7 +88,7 @@ class Px4Flight(VehicleFlight):
     def disarm(self, force: bool = False) -> bool:
         was_armed, done = self.armed, super().disarm(force)
         if was_armed and not self.armed:
-            with self.caused_by('self'):
+            with self.truth.caused_by('self'):
                 self._set_number(self._mode_after_disarming)
             self.track = None
         return done
@@ -99,7 +99,7 @@ class Px4Flight(VehicleFlight):
             self.texts.append((CRITICAL, 'No valid mission available, loitering'))
             number = self.custom_modes[FlightMode.HOLD]
         done = super().set_custom_mode(number)
-        if done and self._cause != 'failsafe' and self.mode not in _KEEPS_DISARMED:
+        if done and self.truth.cause != 'failsafe' and self.mode not in _KEEPS_DISARMED:
             self._mode_after_disarming = number
         return done
 
@@ -111,7 +111,7 @@ class Px4Flight(VehicleFlight):
     def _activate(self) -> None:
         if self._restarts:
             self.seq, self._finished = 0, False
-            self.note('mission_restart', cause=self._cause)
+            self.truth.note('mission_restart', cause=self.truth.cause)
         self._activated, self._disarmed, self._climbs_first = True, False, True
 
     def can_fly_mission(self) -> bool:
@@ -208,7 +208,7 @@ class Px4Flight(VehicleFlight):
             self.seq += 1
             return
         self._finished = self.result.finished = True
-        self.note('mission_end')
+        self.truth.note('mission_end')
         if not self.landed:
             self.set_mode(FlightMode.HOLD)
 
