@@ -31,7 +31,9 @@ def problem_of(uavs, tasks):
     return make_problem(uavs, tasks, {}, Limits(), Rules())
 
 
-PROBLEM = problem_of(*make(2, 9))
+@pytest.fixture(scope='module')
+def problem():
+    return problem_of(*make(2, 9))
 
 
 def test_a_seed_and_a_number_of_iterations_give_the_same_plan():
@@ -55,22 +57,22 @@ def test_the_search_improves_on_the_construction():
     assert plan(uavs, tasks, budget=60.0, max_iterations=5000).distance < 0.97 * built.distance
 
 
-def test_temperatures_fall_twice_and_then_stay_constant(monkeypatch):
-    colony = Colony(PROBLEM, repair(PROBLEM, {}), 1, ColonyParams(scouts=0.0))
+def test_temperatures_fall_twice_and_then_stay_constant(monkeypatch, problem):
+    colony = Colony(problem, repair(problem, {}), 1, ColonyParams(scouts=0.0))
     calls, seen = [], []
     monkeypatch.setattr(colony, '_intensify', calls.append)
     for begin, end in pairwise([*(each.begin for each in COOLINGS), 1.0]):
         colony.fly(max(begin, 1e-6), 0.5 * (begin + end), 10)
-        seen += [colony.temperature(share) / PROBLEM.scale
+        seen += [colony.temperature(share) / problem.scale
                  for share in (begin, 0.5 * (begin + end), end)]
         colony.fly(0.5 * (begin + end), end, 10)
     assert seen == pytest.approx([3.0, 0.3 ** 0.5, 0.1, 1.0, 0.1 ** 0.5, 0.1, 0.1, 0.1, 0.1])
     assert len(calls) == 2  # at the start of each phase but the first
 
 
-def test_intensification_continues_from_the_best():
-    start = repair(PROBLEM, {})
-    colony = Colony(PROBLEM, start, 1, ColonyParams())
+def test_intensification_continues_from_the_best(problem):
+    start = repair(problem, {})
+    colony = Colony(problem, start, 1, ColonyParams())
     clear(colony.arrays, colony.routes)
     colony.arrays.unassigned_cost[:] *= 2.0
     colony._intensify(1e6)

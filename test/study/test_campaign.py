@@ -15,8 +15,6 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.study import executors
 from uav_task_alloc.study.campaign import MAX_BROKEN_EXECUTORS, Job, load_results, run_campaign
 
-distributed = pytest.importorskip('distributed')
-
 
 def square(x):
     return {'x': x, 'square': x * x}
@@ -126,6 +124,7 @@ def test_a_job_that_always_kills_its_process_is_given_up(tmp_path):
 @pytest.fixture
 def cluster(monkeypatch):
     """Two workers that can import this file."""
+    distributed = pytest.importorskip('distributed')  # here, as its import takes a second
     here = str(Path(__file__).parent)
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join([here, os.environ.get('PYTHONPATH', '')]))
     with distributed.LocalCluster(n_workers=2, processes=True, threads_per_worker=1,
