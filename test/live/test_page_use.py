@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live page by keyboard and screen reader, with long names, and with UAVs that come later."""
+"""The live page by keyboard and screen reader, with long names, many UAVs, and later ones."""
 import pytest
 from chromium import open_page, wait
 from small_run import BEGIN, FIRST, Run, announced, state, statuses
@@ -14,6 +14,21 @@ def test_a_long_name_of_a_uav_leaves_the_page_as_wide_as_the_window(view, width)
     page.set_viewport_size({'width': width, 'height': 844})
     wait(page, '#alarm', f'{LONG}: fault')
     assert page.evaluate('document.documentElement.scrollWidth') == width
+
+
+@pytest.mark.parametrize(('count', 'scrolls'), [(50, True), (2, False)])
+def test_a_phone_shows_the_map_on_its_first_screen_and_each_uav(view, count, scrolls):
+    page = view(Run().add(*FIRST, *(
+        state(BEGIN, f'u{k}', (20.0 * k, 0.0)) for k in range(1, count + 1))).snapshots)
+    page.set_viewport_size({'width': 390, 'height': 844})
+    wait(page, '#uav-count', str(count))
+    assert page.locator('#map').bounding_box()['y'] < 744
+    box = page.locator('#uav-box')
+    assert box.evaluate('box => box.scrollHeight > box.clientHeight') == scrolls
+    page.locator('#uavs details').last.scroll_into_view_if_needed()
+    outer, inner = box.bounding_box(), page.locator('#uavs details').last.bounding_box()
+    assert outer['y'] <= inner['y']
+    assert inner['y'] + inner['height'] <= outer['y'] + outer['height']
 
 
 def test_a_uav_with_a_problem_is_announced_to_screen_readers(view):
