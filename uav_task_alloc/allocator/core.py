@@ -39,8 +39,8 @@ from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.monitor import MonitorStep
 from uav_task_alloc.terrain import Terrain
 
-# [s] after a restart, from the first report of the last UAV on, in which no task changes its
-# UAV: the bridge repeats events that were missed after 2 s
+# [s] after a restart, from the lists and the first report of the last UAV on, in which no task
+# changes its UAV: the bridge repeats events that were missed 2 s after it has its list again
 _RESTART_HOLD = 3.0
 _CLOCK_STEP, _FASTEST = 5.0, 200.0  # [s] that clocks may be apart; times real time
 _LEARNED_PERIOD = 5.0  # [s] between two rows of the learned state
@@ -112,11 +112,12 @@ class Allocator:
         self.batteries.tick(now, stamp)
         self._end_orders(stamp)
         self._changes.end(now, stamp)
+        if self._restarted:  # the plan of the previous run is published before any other
+            self._restarted, self._hold_until = False, now + _RESTART_HOLD
+            world.publish(self._list_updates.of_previous_run(stamp), stamp, resend=True)
+            self._publisher.allocate(Plan({}), 'restart', stamp)
         world.publish(self._list_updates.shortened(stamp), stamp)
         world.publish(self._list_updates.to_resend(stamp), stamp, resend=True)
-        if self._restarted:  # the plan of the previous run is published before any other
-            self._restarted = False
-            self._publisher.allocate(Plan({}), 'restart', stamp)
         self._check_hold(now)
         self._check_approval(now, stamp)
         if self._publisher.due(now):

@@ -9,7 +9,7 @@ from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.records import AnnouncementAction
 from uav_task_alloc.allocator.replanning.learned_state import learned_row, learned_state
 from uav_task_alloc.journal import JournalRow
-from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.model import Leg, Task, ThreatZone
 from uav_task_alloc.solver.tables import Learnt, Tables
 from uav_task_alloc.solver.warm import WarmState
 
@@ -125,6 +125,7 @@ def test_a_uav_that_reports_after_the_hold_is_not_compared(rows):
     before, = (each for each in restored_state(rows).lists if each.uav == 'a')
     first, second = before.task_ids
     driver = AllocatorDriver(restored_state(rows))
+    driver.settle()
     driver.settle(wait=30.0)
     driver.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=before.revision)
     driver.settle(wait=4.0)
@@ -217,16 +218,38 @@ def test_a_uav_with_the_list_that_was_resent_reports_itself_what_it_has_flown():
 def test_no_list_is_resent_with_a_task_completed_out_of_turn():
     driver = AllocatorDriver()
     driver.uav('a', 0.0, 0.0, 50.0)
-    driver.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 300, 0))
+    driver.add(('t1', 100, 0), ('t2', 200, 80), ('t3', 300, 0))
     driver.settle()
     driver.event('COMPLETED', 't2', 'a')
     after = AllocatorDriver(restored_state(driver.core.rows()))
     after.core.tick(after.now, after.now)
     after.take()
-    assert after.history == []
+    assert [each.task_ids for each in after.history] == [('t1', 't3')]
+    assert after.lists['a'].stops[1].leg.via == ((200.0, 80.0, 50.0),)  # that way is clear
     after.uav('a', 0.0, 0.0, 50.0)
     after.settle()
     assert after.route('a') == ('t1', 't3')
+    assert after.lists['a'].stops[1].leg == Leg((), 200.0)
+
+
+def test_a_uav_that_is_switched_off_reports_what_it_has_flown_before_its_tasks_move():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 300, 0))
+    driver.settle()
+    driver.event('COMPLETED', 't3', 'a')
+    driver.world.set_available('a', False, driver.now)
+    after = AllocatorDriver(restored_state(driver.core.rows()))
+    for uav_id in ('a', 'b'):
+        after.uav(uav_id, 0.0, 0.0, 50.0)
+    after.settle(wait=2.9)  # the node waits for subscribers so long
+    assert after.route('a') == ('t1', 't2')
+    after.settle(wait=2.0)  # after which the bridge repeats
+    assert after.event('COMPLETED', 't1', 'a') == ''
+    assert after.event('COMPLETED', 't2', 'a') == ''
+    after.settle(wait=4.0)
+    assert {each.task_ids for each in after.history if each.uav == 'b'} <= {()}
+    assert (after.state('t1'), after.state('t2')) == ('COMPLETED', 'COMPLETED')
 
 
 def fixed_rounds(*world, max_iterations, **more):

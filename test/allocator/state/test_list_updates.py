@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lists that are published without a new plan: less ended tasks, and again where asked for."""
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -27,7 +28,7 @@ def state():
     stops = tuple(map(stop, (1, 2, 3)))
     tasks = TaskRegistry(TaskRecord(each.task, each.task, TaskState.ASSIGNED, 'a')
                          for each in stops)
-    lists = PublishedLists([UavList('a', 4, stops, distance=300.0)])
+    lists = PublishedLists([UavList('a', 4, stops, returns=True, distance=600.0)])
     flights = Flights(Fleet(), lists, AllocatorParams)
     return SimpleNamespace(
         lists=lists, updates=ListUpdates(tasks, lists, flights),
@@ -42,7 +43,7 @@ def test_ended_tasks_at_the_front_are_left_out(state):
     state.end('t1')
     state.end('t2')
     short = state.updates.shortened(0.0)['a']
-    assert (short.task_ids, short.distance) == (('t3',), 100.0)
+    assert (short.task_ids, short.distance) == (('t3',), 400.0)
 
 
 def test_a_list_in_which_a_later_task_has_ended_waits_for_a_plan(state):
@@ -58,3 +59,29 @@ def test_lists_of_the_previous_run_are_resent_with_arrivals_from_now(state):
     assert [each.eta for each in resent.stops] == [5.0, 15.0, 25.0]
     state.lists.publish(resent, 5.0, resend=True)
     assert state.updates.to_resend(5.0) == {}
+
+
+def places(each):
+    """The points flown in a list."""
+    return [point for stop in each.stops for point in stop.line] + list(each.end_via)
+
+
+@pytest.mark.parametrize(('ended', 'xs', 'distance'), [
+    ('', [100, 200, 300], 600), ('1', [200, 300], 500), ('2', [100, 200, 300], 600),
+    ('3', [100, 200, 300], 600), ('13', [200, 300], 500), ('23', [100, 200, 300], 600),
+    ('123', [], 0)])
+def test_after_a_restart_each_list_is_sent_without_its_ended_tasks_along_the_same_way(
+        state, ended, xs, distance):
+    for number in ended:
+        state.end(f't{number}')
+    sent = state.updates.of_previous_run(5.0)['a']
+    assert sent.task_ids == tuple(f't{k}' for k in '123' if k not in ended)
+    assert [x for x, _, _ in places(sent)] == xs
+    assert (sent.distance, sent.stamp, sent.returns) == (distance, 5.0, True)
+
+
+def test_a_list_that_ends_at_its_last_task_ends_there_after_a_restart(state):
+    state.lists.lists['a'] = replace(state.lists.lists['a'], returns=False, distance=300.0)
+    state.end('t3')
+    sent = state.updates.of_previous_run(5.0)['a']
+    assert (places(sent)[-1][0], sent.distance) == (200.0, 200.0)

@@ -35,5 +35,15 @@ class ListUpdates:
                 for uav_id in sorted(self._lists.to_resend)
                 if not any(map(self._ended, self._lists.get(uav_id).task_ids))}
 
+    def of_previous_run(self, stamp: float) -> dict[str, UavList]:
+        """Return all lists after a restart, without ended tasks, and before any plan.
+
+        The bridges repeat how the tasks of their lists ended, for which a plan may come too
+        late; and there is none for a UAV that may not be used.
+        """
+        return {uav_id: self._lists.without_any_ended(uav_id, self._ended, stamp,
+                                                      self._flights.of(uav_id, stamp))
+                for uav_id in sorted(self._lists.to_resend)}
+
     def _ended(self, task_id: str) -> bool:
         return not self._tasks.is_open(task_id)

@@ -2,13 +2,15 @@
 """The task list published last for each UAV, and which revisions contained which task."""
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.state.flight_pace import UavFlight
 from uav_task_alloc.allocator.state.stop_times import timed_stops
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.model import Leg, Point
 from uav_task_alloc.piece_ids import split_piece
 
 _MOST_FOREIGN = 2**30  # revision of another allocator: this one goes on from it to 2**31 - 1
@@ -177,6 +179,34 @@ class PublishedLists:
         return replace(published, stops=stops,
                        distance=published.distance - flown if stops else 0.0)
 
+    def without_any_ended(self, uav_id: str, ended: Callable[[str], bool], stamp: float,
+                          flight: UavFlight | None) -> UavList:
+        """Return the list without its ended tasks; arguments as of `restamped`.
+
+        Where one was, its places stay as detour points: only along them the way is known to be
+        clear of zones.
+        """
+        published = self.get(uav_id)
+        stops, over, metres = list[ListStop](), list[ListStop](), published.distance
+        for stop in published.stops:
+            if not ended(stop.task.id):
+                stops.append(replace(stop, leg=Leg(
+                    (*_places(over), *stop.leg.via), stop.leg.length + _length(over))))
+                over.clear()
+            elif stops:
+                over.append(stop)
+            else:  # at its front
+                metres -= stop.length
+        end_via = published.end_via
+        if published.returns or end_via:
+            end_via = *_places(over), *end_via
+        else:
+            metres -= _length(over)
+        timed = timed_stops(stops, flight) if flight else _later(
+            stops, min(0.0, published.stamp - stamp))
+        return replace(published, stops=timed, stamp=stamp, end_via=end_via,
+                       distance=metres if timed else 0.0)
+
     def forget_uav(self, uav_id: str) -> None:
         """Remove a UAV; if it reports again its revisions still increase."""
         self._on_board.pop(uav_id, None)
@@ -213,6 +243,15 @@ def shifted_list(each: UavList, by: float) -> UavList:
     return replace(each, stamp=each.stamp + by, stops=tuple(
         replace(stop, begin_after=max(0.0, stop.begin_after + by)) if stop.begin_after else stop
         for stop in each.stops))
+
+
+def _places(stops: Iterable[ListStop]) -> Iterator[Point]:
+    """All points of stops, in the order of flight."""
+    return chain.from_iterable(stop.line for stop in stops)
+
+
+def _length(stops: Iterable[ListStop]) -> float:
+    return sum(stop.length for stop in stops)
 
 
 def _later(stops: Sequence[ListStop], seconds: float) -> tuple[ListStop, ...]:
