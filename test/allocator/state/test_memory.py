@@ -156,7 +156,7 @@ def test_finding_24_a_flood_of_invented_uavs_leaves_no_lists_and_no_rows():
     assert driver.route('real') == ('t1',)
     world = driver.world
     for by_uav in (world.zone_checks._checked, world.zone_checks.stranded,
-                   world.validity.zones_when_built, world._events._resent):
+                   world.validity.zones_when_built, world._events._resent, world.jumps._jumps):
         assert set(by_uav) <= {'real', 'home'}
 
 

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which reports of a vehicle count: valid positions, the newest of a type, and MISSION_CURRENT."""
 import pytest
+from mission_bench import ORIGIN, OURS
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE
 from uav_task_alloc.mavlink.gcs.mission_report import MissionReport
 from uav_task_alloc.mavlink.gcs.newest_reports import NewestReports
 from uav_task_alloc.mavlink.gcs.position_validity import PositionValidity
+from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.transport.codec import Codec
 
 PX4, ARDUPILOT = d.MAV_AUTOPILOT_PX4, d.MAV_AUTOPILOT_ARDUPILOTMEGA
 EKF, ESTIMATOR = d.MAVLINK_MSG_ID_EKF_STATUS_REPORT, d.MAVLINK_MSG_ID_ESTIMATOR_STATUS
@@ -110,3 +114,22 @@ def test_the_number_of_items_is_known_where_it_is_reported(total, known):
     mission.forget()
     assert mission.current is mission.total is None
     assert (mission.state, mission.plan_id, mission.in_mission_frame) == (UNKNOWN, 0, 0)
+
+
+def test_a_vehicle_that_has_restarted_has_to_show_all_again():
+    telemetry, sends, receives = Telemetry(PX4_PROFILE, ORIGIN, 0.0), Codec(1, 1), Codec(*OURS)
+
+    def receive(now):
+        frames = (sends.pack(d.MAVLink_global_position_int_message(
+            round(now * 1e3), 473977420, 85455940, 488000, 0, 0, 0, 0, 0)),
+            sends.pack(current(ACTIVE, seq=3)))
+        for message in receives.parse(b''.join(frames)):
+            telemetry.receive(message, now)
+
+    for now in (1.0, 2.0, 3.0, 4.0):
+        receive(now)
+    assert (telemetry.has_position, telemetry.mission.current) == (True, 3)
+    telemetry.restart()
+    assert (telemetry.has_position, telemetry.mission.current) == (False, None)
+    receive(4.5)
+    assert (telemetry.has_position, telemetry.mission.current) == (False, 3)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is known of an upload that runs, was taken, or has ended without an answer."""
 import pytest
+from flight_bench import flying
 from mission_bench import task_list
 from test_findings_kills import items_at
 
@@ -66,6 +67,17 @@ def test_nothing_is_open_after_a_restart_of_the_vehicle():
     upload.forget()
     assert not upload.is_open
     assert upload.running is None
+
+
+@pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+def test_a_restart_of_the_vehicle_ends_the_upload_of_its_mission(kind):
+    bench = flying(kind, 'ABCD', delay=(0.02, 0.02), tick=0.02)
+    bench.assign(task_list('DCBA', 2))
+    assert bench.run(lambda: bench.onboard().latest_upload.is_open, 10.0)
+    assert bench.onboard().state.name == 'UPLOADING'
+    bench.onboard().restarted()
+    assert not bench.onboard().latest_upload.is_open
+    assert bench.onboard().state.name == 'UNKNOWN'
 
 
 def test_it_is_outdated_once_there_is_a_later_list():
