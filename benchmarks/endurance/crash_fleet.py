@@ -100,20 +100,22 @@ class Flyer:
             uav_id, place, publish, ledger, rng)
         self.list = m.TaskList(uav_id=uav_id)
         self.flown: set[str] = set()
+        self.failed: set[str] = set()  # refused since, as by the bridge
         self.active, self._until, self._retry = '', 0.0, EventRetry()
 
     def assign(self, msg: m.TaskList, now: float) -> None:
         self.list, ids = msg, [planned.task.task_id for planned in msg.tasks]
-        self._retry.set_ended([TaskProgress(task_id, 'COMPLETED', msg.revision)
-                               for task_id in ids if task_id in self.flown], now)
+        self._retry.set_ended([
+            TaskProgress(task_id, 'COMPLETED' if task_id in self.flown else 'FAILED', msg.revision)
+            for task_id in ids if task_id in self.flown | self.failed], now)
         if self.active not in ids:
             self.active = ''
 
     def step(self, now: float) -> None:
         tasks = [p.task for p in self.list.tasks]
         for retry in self._retry.step(now):
-            self.event(E.COMPLETED, retry.task)
-        left = [task for task in tasks if task.task_id not in self.flown]
+            self.event(getattr(E, retry.event), retry.task)
+        left = [task for task in tasks if task.task_id not in self.flown | self.failed]
         if not self.active and left:
             self.active, self._until = left[0].task_id, now + self.rng.uniform(*FLOWN_IN)
             self.ledger.starts(self.active)
@@ -124,6 +126,7 @@ class Flyer:
     def _arrive(self, task: m.Task) -> None:
         self.place, self.active = (task.position.x, task.position.y), ''
         if self.rng.random() < FAILS:
+            self.failed.add(task.task_id)
             self.event(E.FAILED, task.task_id, 'random failure')
             self.list = m.TaskList(uav_id=self.uav_id, revision=self.list.revision)
             return
