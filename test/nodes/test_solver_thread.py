@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The solver in its thread: what the node receives of it, and the error of the last solve."""
+import threading
 import time
 from types import SimpleNamespace
 
@@ -20,6 +21,7 @@ class NodeStandIn:
 
     def __init__(self):
         self.errors, self.triggers, self.callback = [], 0, None
+        self.has_result = threading.Semaphore(0)
 
     def get_logger(self):
         return SimpleNamespace(error=lambda text, throttle_duration_sec: self.errors.append(text))
@@ -30,6 +32,7 @@ class NodeStandIn:
 
     def _trigger(self):
         self.triggers += 1
+        self.has_result.release()
 
 
 @pytest.fixture
@@ -45,7 +48,7 @@ def thread(monkeypatch):
             if isinstance(outcome, Exception):
                 raise outcome
             while outcome == 'until stopped' and not stop():
-                time.sleep(0.001)
+                time.sleep(0.001)  # as iterations take, between which it is polled
             return ANSWER
 
         monkeypatch.setattr(warm_up, 'compile_kernels', lambda plan, params: None)
@@ -54,7 +57,7 @@ def thread(monkeypatch):
         solver = SolverThread(node, AllocatorParams, lambda: None)
         started.append(solver)
         solver.start()
-        assert next_of(solver) is None  # it is loaded
+        assert next_of(solver, node) is None  # it is loaded
         return solver, node
 
     yield start
@@ -62,14 +65,10 @@ def thread(monkeypatch):
         solver.close()
 
 
-def next_of(solver):
-    """The next result."""
-    end = time.monotonic() + 60.0  # the import of the solver
-    while time.monotonic() < end:
-        for result in solver.results():
-            return result
-        time.sleep(0.001)
-    raise AssertionError('no result')
+def next_of(solver, node):
+    """The next result, once the node is called for it."""
+    assert node.has_result.acquire(timeout=60.0)  # the import of the solver
+    return next(solver.results())
 
 
 def problem(background=False):
@@ -80,7 +79,7 @@ def test_the_node_is_called_for_each_result(thread):
     solver, node = thread(ANSWER)
     assert node.triggers == 1
     solver.submit(problem())
-    assert next_of(solver) is ANSWER
+    assert next_of(solver, node) is ANSWER
     assert node.triggers == 2
     assert list(solver.results()) == []
 
@@ -88,18 +87,18 @@ def test_the_node_is_called_for_each_result(thread):
 def test_the_error_of_a_solve_stays_until_one_succeeds(thread):
     solver, node = thread(ValueError('no'), ANSWER)
     solver.submit(problem())
-    assert next_of(solver) is None
+    assert next_of(solver, node) is None
     assert solver.error == 'ValueError: no'
     assert node.errors == ['solver: ValueError: no']
     solver.submit(problem())
-    assert next_of(solver) is ANSWER
+    assert next_of(solver, node) is ANSWER
     assert solver.error == ''
 
 
 def test_a_long_error_is_cut(thread):
-    solver, _ = thread(ValueError('x' * 1000))
+    solver, node = thread(ValueError('x' * 1000))
     solver.submit(problem())
-    assert next_of(solver) is None
+    assert next_of(solver, node) is None
     assert len(solver.error) == 500
 
 
@@ -111,10 +110,10 @@ def test_it_knows_whether_its_problem_is_one_of_the_background(thread, backgroun
 
 
 def test_a_solve_that_is_stopped_early_has_a_result(thread):
-    solver, _ = thread('until stopped')
+    solver, node = thread('until stopped')
     solver.submit(problem())
     solver.stop_early()
-    assert next_of(solver) is ANSWER
+    assert next_of(solver, node) is ANSWER
 
 
 def test_nothing_follows_after_the_end(thread):

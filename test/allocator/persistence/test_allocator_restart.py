@@ -215,12 +215,18 @@ def test_a_uav_with_the_list_that_was_resent_reports_itself_what_it_has_flown():
     assert (after.state('t1'), after.reason('t1'), after.route('a')) == ('COMPLETED', '', ('t2',))
 
 
-def test_no_list_is_resent_with_a_task_completed_out_of_turn():
+def out_of_turn(task_id):
+    """A driver in which a, with the list t1 t2 t3, has completed one that is not the first."""
     driver = AllocatorDriver()
     driver.uav('a', 0.0, 0.0, 50.0)
     driver.add(('t1', 100, 0), ('t2', 200, 80), ('t3', 300, 0))
     driver.settle()
-    driver.event('COMPLETED', 't2', 'a')
+    driver.event('COMPLETED', task_id, 'a')
+    return driver
+
+
+def test_no_list_is_resent_with_a_task_completed_out_of_turn():
+    driver = out_of_turn('t2')
     after = AllocatorDriver(restored_state(driver.core.rows()))
     after.core.tick(after.now, after.now)
     after.take()
@@ -233,11 +239,7 @@ def test_no_list_is_resent_with_a_task_completed_out_of_turn():
 
 
 def test_a_uav_that_is_switched_off_reports_what_it_has_flown_before_its_tasks_move():
-    driver = AllocatorDriver()
-    driver.uav('a', 0.0, 0.0, 50.0)
-    driver.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 300, 0))
-    driver.settle()
-    driver.event('COMPLETED', 't3', 'a')
+    driver = out_of_turn('t3')
     driver.world.set_available('a', False, driver.now)
     after = AllocatorDriver(restored_state(driver.core.rows()))
     for uav_id in ('a', 'b'):

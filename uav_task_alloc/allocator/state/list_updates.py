@@ -22,12 +22,12 @@ class ListUpdates:
         self._tasks, self._lists, self._flights = tasks, lists, flights
 
     def shortened(self, stamp: float) -> dict[str, UavList]:
-        """Return the lists with ended tasks at their front, without those."""
-        shorter = {uav_id: self._lists.without_ended(uav_id, self._ended, stamp,
-                                                     self._flights.of(uav_id, stamp))
-                   for uav_id, each in self._lists.lists.items()
-                   if each.stops and self._ended(each.stops[0].task.id)}
-        return {uav_id: each for uav_id, each in shorter.items() if each is not None}
+        """Return the lists of which only tasks at the front have ended, without those.
+
+        Where a later one has, legs change: that is left to the next plan.
+        """
+        return {uav_id: self._without_ended(uav_id, stamp)
+                for uav_id, each in self._lists.lists.items() if self._front_has_ended(each)}
 
     def to_resend(self, stamp: float) -> dict[str, UavList]:
         """Return the lists to publish again; one with a later ended task waits for a plan."""
@@ -41,9 +41,17 @@ class ListUpdates:
         The bridges repeat how the tasks of their lists ended, for which a plan may come too
         late; and there is none for a UAV that may not be used.
         """
-        return {uav_id: self._lists.without_any_ended(uav_id, self._ended, stamp,
-                                                      self._flights.of(uav_id, stamp))
+        return {uav_id: self._without_ended(uav_id, stamp)
                 for uav_id in sorted(self._lists.to_resend)}
+
+    def _front_has_ended(self, each: UavList) -> bool:
+        """Whether tasks at the front of a list have ended, and no later ones."""
+        ended = list(map(self._ended, each.task_ids))
+        return ended[:1] == [True] and ended == sorted(ended, reverse=True)
+
+    def _without_ended(self, uav_id: str, stamp: float) -> UavList:
+        return self._lists.without_ended(uav_id, self._ended, stamp,
+                                         self._flights.of(uav_id, stamp))
 
     def _ended(self, task_id: str) -> bool:
         return not self._tasks.is_open(task_id)

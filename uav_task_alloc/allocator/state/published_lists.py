@@ -158,35 +158,16 @@ class PublishedLists:
         return replace(published, stops=stops, stamp=stamp)
 
     def without_ended(self, uav_id: str, ended: Callable[[str], bool], stamp: float,
-                      flight: UavFlight | None) -> UavList | None:
-        """Return the list without the ended tasks at its front; arguments as of `restamped`.
+                      flight: UavFlight | None) -> UavList:
+        """Return the list without its ended tasks; other arguments as of `restamped`.
 
-        None where there are none, or where a later task has ended, too: that changes legs, and
-        is left to the next plan.
+        Where one was after an open task, its places stay as detour points: only along them the
+        way is known to be clear of zones.
+
+        Args:
+            ended: whether a task has ended, by its id.
         """
-        stops = self.get(uav_id).stops
-        if not stops or not ended(stops[0].task.id):
-            return None
-        published = self.restamped(uav_id, stamp, None)
-        stops = published.stops
-        while stops and ended(stops[0].task.id):
-            before, stops = stops[0], stops[1:]
-        stops = timed_stops(stops, flight, before.exit) if flight else stops
-        if any(ended(stop.task.id) for stop in stops):
-            return None
-        flown = sum(stop.length
-                    for stop in published.stops[:len(published.stops) - len(stops)])
-        return replace(published, stops=stops,
-                       distance=published.distance - flown if stops else 0.0)
-
-    def without_any_ended(self, uav_id: str, ended: Callable[[str], bool], stamp: float,
-                          flight: UavFlight | None) -> UavList:
-        """Return the list without its ended tasks; arguments as of `restamped`.
-
-        Where one was, its places stay as detour points: only along them the way is known to be
-        clear of zones.
-        """
-        published = self.get(uav_id)
+        published, start = self.get(uav_id), None
         stops, over, metres = list[ListStop](), list[ListStop](), published.distance
         for stop in published.stops:
             if not ended(stop.task.id):
@@ -196,13 +177,13 @@ class PublishedLists:
             elif stops:
                 over.append(stop)
             else:  # at its front
-                metres -= stop.length
+                metres, start = metres - stop.length, stop.exit
         end_via = published.end_via
         if published.returns or end_via:
             end_via = *_places(over), *end_via
         else:
             metres -= _length(over)
-        timed = timed_stops(stops, flight) if flight else _later(
+        timed = timed_stops(stops, flight, start) if flight else _later(
             stops, min(0.0, published.stamp - stamp))
         return replace(published, stops=timed, stamp=stamp, end_via=end_via,
                        distance=metres if timed else 0.0)
