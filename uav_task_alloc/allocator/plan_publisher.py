@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.records import Allocation
+from uav_task_alloc.allocator.replanning.built_lists import BuiltLists, plan_in_force
 from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
-from uav_task_alloc.allocator.replanning.planning import BuiltLists, plan_in_force
 from uav_task_alloc.allocator.replanning.predictions import Predictions
 from uav_task_alloc.allocator.replanning.task_reasons import task_steps
 from uav_task_alloc.allocator.state.world import World

@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 from allocation import AllocatorDriver
 
+from uav_task_alloc.allocator.replanning.built_lists import BuiltLists
 from uav_task_alloc.allocator.replanning.lists_to_publish import (
     holding_plan,
     lists_apart,
     lists_to_publish,
 )
-from uav_task_alloc.allocator.replanning.planning import BuiltLists
 from uav_task_alloc.model import Plan, Task
 
 KEEPS, BREAKS = Plan({'a': ('due', 'far')}), Plan({'a': ('far', 'due')})

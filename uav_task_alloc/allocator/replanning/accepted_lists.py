@@ -8,16 +8,16 @@ from itertools import chain, dropwhile, zip_longest
 
 from uav_task_alloc.allocator.list_records import LaterTrips, UavList
 from uav_task_alloc.allocator.records import Proposal
-from uav_task_alloc.allocator.replanning.from_now import separation_of
-from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
-from uav_task_alloc.allocator.replanning.lists_to_publish import lists_apart
-from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav
-from uav_task_alloc.allocator.replanning.planning import (
+from uav_task_alloc.allocator.replanning.built_lists import (
     BuiltLists,
     backward_paths,
     build_empty_list,
     build_list,
 )
+from uav_task_alloc.allocator.replanning.from_now import separation_of
+from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
+from uav_task_alloc.allocator.replanning.lists_to_publish import lists_apart
+from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav
 from uav_task_alloc.allocator.replanning.task_lists import legs_of_list
 from uav_task_alloc.allocator.replanning.trips import remaining_trips
 from uav_task_alloc.allocator.state.world import World

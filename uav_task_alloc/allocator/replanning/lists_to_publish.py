@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from uav_task_alloc.allocator.replanning.built_lists import BuiltLists, build_lists
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
-from uav_task_alloc.allocator.replanning.planning import BuiltLists, build_lists
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan
 

@@ -8,9 +8,9 @@ from itertools import chain
 
 from uav_task_alloc.allocator.list_records import LaterTrips
 from uav_task_alloc.allocator.records import Proposal
+from uav_task_alloc.allocator.replanning.built_lists import BuiltLists
 from uav_task_alloc.allocator.replanning.lists_to_publish import lists_to_publish
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, exchange_groups
-from uav_task_alloc.allocator.replanning.planning import BuiltLists
 from uav_task_alloc.allocator.replanning.proposal_changes import new_proposal, present_routes
 from uav_task_alloc.allocator.replanning.trips import remaining_trips
 from uav_task_alloc.allocator.state.world import World

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 
 from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.records import Proposal
+from uav_task_alloc.allocator.replanning.built_lists import BuiltLists
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav
-from uav_task_alloc.allocator.replanning.planning import BuiltLists
 from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import counted, first_of

@@ -8,8 +8,8 @@ from dataclasses import replace
 from itertools import count
 
 from uav_task_alloc.allocator.list_records import ListStop, UavList
+from uav_task_alloc.allocator.replanning.built_lists import BuiltLists
 from uav_task_alloc.allocator.replanning.from_now import separation_of
-from uav_task_alloc.allocator.replanning.planning import BuiltLists
 from uav_task_alloc.allocator.state.flight_pace import UavFlight
 from uav_task_alloc.allocator.state.stop_times import slower_along, timed_stops
 from uav_task_alloc.allocator.state.world import World

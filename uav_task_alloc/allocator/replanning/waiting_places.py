@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.order_records import OrderKind
 from uav_task_alloc.allocator.replan_records import FleetOutlook
+from uav_task_alloc.allocator.replanning.built_lists import way_to_place_is_clear
 from uav_task_alloc.allocator.replanning.from_now import objective_of, separation_of
-from uav_task_alloc.allocator.replanning.planning import way_to_place_is_clear
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.allocator.state.stop_times import finish_time
 from uav_task_alloc.allocator.state.world import World
