@@ -369,13 +369,3 @@ def test_one_that_stands_for_an_upload_is_in_the_way_until_its_list_is_on_board(
     sky.more[1] |= {'mode': 'ON_MISSION', 'list_revision': sky.revision + 1}
     sky.report((-140.0, 0.0, 50.0), (0.0, 0.0, 50.0))
     assert sky.step() == [('u1', False)]
-
-
-def test_nothing_is_kept_of_uavs_that_are_forgotten():
-    sky = Sky()
-    sky.step()
-    watch = sky.core.separation
-    assert watch._sent.keys() == {'u1', 'u2'}
-    sky.world.forget_uav('u2')
-    sky.step()
-    assert watch._sent.keys() == {'u1'}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from allocation import AllocatorDriver
 
+from uav_task_alloc.allocator.monitored_uavs import MonitoredUavs
 from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.geometry.zones import path_is_clear, zones_around
 from uav_task_alloc.model import ThreatZone
@@ -245,10 +246,8 @@ def test_others_keep_apart_from_its_way():
     fleet = IdleFleet((0.0, 0.0, 50.0), separation__horizontal=30.0)
     fleet.wait()
     assert fleet.place()
-    watch = fleet.driver.core.separation
-    record = fleet.driver.world.uav_record('u0')
-    monitored = watch._monitored('u0', record, fleet.driver.now)
-    assert monitored.way.points[-1][1] == fleet.place()
+    monitored = MonitoredUavs(fleet.driver.world).at(fleet.driver.now)
+    assert monitored['u0'].way.points[-1][1] == fleet.place()
 
 
 def test_what_was_announced_survives_a_restart():
