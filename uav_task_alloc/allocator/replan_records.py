@@ -35,6 +35,7 @@ class ReplanProblem:
     stop_time: float = 0.0  # [s] that braking and accelerating cost at each task
     outlook: FleetOutlook | None = None  # None: the next tasks do not count
     too_high: Mapping[str, str] = field(default_factory=dict)  # for which UAVs; by task id
+    later_only: frozenset[str] = frozenset()  # ids of UAVs whose batteries are changed first
 
 
 @dataclass(frozen=True, slots=True)

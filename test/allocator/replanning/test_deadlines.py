@@ -116,7 +116,7 @@ def test_a_deadline_that_no_uav_can_keep_is_unassigned_with_times_of_the_clock()
     made.settle()
     assert made.state('t') == 'UNASSIGNED'
     assert made.reason('t') == (
-        'latest 1050.0 s cannot be kept: no UAV can start it before 1100.1 s (a); an update with '
+        'latest 1050.0 s cannot be kept: no UAV can start it before 1102.1 s (a); an update with '
         'a later `latest` would help')
     report(made, {'a': (0, 0)}, seconds=60.0)
     made.core.world.request_replan('test', made.now)
@@ -285,7 +285,7 @@ def test_a_later_trip_is_counted_on_and_published_after_the_battery_change():
     assert made.lists['a'].returns
     assert (made.state(second), made.reason(second)) == ('ASSIGNED', 'after battery change 1 of a')
     assert made.world.deadlines.expected[second] == pytest.approx(
-        made.now + 244.0 + 60.0 + 120.0, abs=3.0)
+        made.now + 8.0 + 244.0 + 60.0 + 120.0, abs=3.0)  # 4 s a take-off, 4 s a stop
     x = 1200.0 if first == 't1' else -1200.0
     uav(made, 'a', x, range=1800.0, battery=0.6, active_task=first, **FULL)
     assert made.event('COMPLETED', first, 'a') == ''

@@ -142,7 +142,7 @@ class _Cover:
 
     def _moves(self, times: Timetable, uav: Uav, rest: Sequence[str]) -> bool:
         """Whether the tasks of a UAV that are not locked may change."""
-        return (len(times.trips.get(uav.id, ())) <= 1 and uav.available_from <= 0.0
+        return (len(times.trips.get(uav.id, ())) <= 1 and uav.id not in self._problem.later_only
                 and not any(is_timed(task) or task.path
                             for task in map(self._tasks.__getitem__, rest)))
 

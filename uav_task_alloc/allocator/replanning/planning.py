@@ -19,7 +19,7 @@ from uav_task_alloc.allocator.replanning.held_deadlines import (
     with_true_values,
 )
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs, with_later_trips
-from uav_task_alloc.allocator.state.stop_times import way_ahead
+from uav_task_alloc.allocator.state.stop_times import first_leg_delay, way_ahead
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan, Point, Task, Uav
 from uav_task_alloc.params import AllocatorParams
@@ -44,10 +44,12 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         world.tasks_to_plan()
     objective, records = objective_of(params), world.task_records()
     stop_time, locked, too_high = 0.0, world.locked_tasks(), dict[str, str]()
+    later = dict[str, Uav]()
     if counts_time(uavs, tasks, objective, params.trips):
-        uavs = tuple(measured_uav(world, uav) for uav in uavs)
-        uavs += tuple(uav for uav_id, uav in waiting_uavs(world, stamp).items()
-                      if not world.usable(uav_id))
+        uavs = tuple(measured_uav(world, uav, stamp) for uav in uavs)
+        later = {uav_id: uav for uav_id, uav in waiting_uavs(world, stamp).items()
+                 if not world.usable(uav_id)}
+        uavs += tuple(later.values())
         uavs, tasks, too_high = with_height_limits(world, uavs, tasks, locked, stamp)
         stop_time = world.flights.stop_time
         tasks = relaxed_tasks(world, tasks, (uav.id for uav in uavs), stamp)
@@ -67,7 +69,7 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         warm=replace(best, reversed=best.reversed - under_way.keys()),
         objective=objective, trips=params.trips, stamp=stamp, stop_time=stop_time,
         since={task.id: records[task.id].since for task in tasks}, outlook=outlook,
-        too_high=too_high)
+        too_high=too_high, later_only=frozenset(later))
 
 
 def ways_under_way(world: World) -> dict[str, tuple[Point, ...]]:
@@ -94,20 +96,25 @@ def ways_under_way(world: World) -> dict[str, tuple[Point, ...]]:
     return rests
 
 
-def measured_uav(world: World, uav: Uav) -> Uav:
+def measured_uav(world: World, uav: Uav, stamp: float) -> Uav:
     """Return a UAV for a problem with times.
 
     Args:
         world: with the flights measured.
         uav: as planned.
+        stamp: [s] published clock.
 
     Returns:
-        With the speed that was measured; on the ground near its home it is at its home.
+        With the speed that was measured, available from when its first leg would begin at that
+        speed; on the ground near its home it is at its home.
     """
-    record = world.uav_record(uav.id)
+    record, flight = world.uav_record(uav.id), world.flights.of(uav.id, stamp)
     assert record is not None  # it is of the fleet
+    assert flight is not None
     at_home = world.flights.at_home_since(uav.id) is not None
-    return replace(uav, cruise_speed=_list_speed(world, uav),
+    speed = _list_speed(world, uav)
+    return replace(uav, cruise_speed=speed,
+                   available_from=first_leg_delay(world.list_of(uav.id).stops, flight, speed),
                    position=record.home if at_home else uav.position,
                    aboard=None if at_home or uav.at_base else frozenset(
                        stop.task.id for stop in world.list_of(uav.id).stops

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
-from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.list_records import ListStop, UavList
 from uav_task_alloc.allocator.records import TaskRecord, TaskVerdict, UavReport
 from uav_task_alloc.allocator.state.fleet import Fleet, may_fly
 from uav_task_alloc.allocator.state.flight_pace import FlightPace
 from uav_task_alloc.allocator.state.flights import Flights
+from uav_task_alloc.allocator.state.stop_times import timed_stops
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
-from uav_task_alloc.model import Task
+from uav_task_alloc.model import Leg, Task
 from uav_task_alloc.timetable import clock_text
 
 _LATE = 0.25  # [s] after its latest that is no rounding
@@ -153,10 +155,21 @@ class Deadlines:
                 pace = FlightPace(speed + math.hypot(*pace.wind), pace.climb, pace.descent)
             places = (task.position, task.end) if task.reversible else (task.position,)
             seconds = min(pace.seconds((record.report.position, place)) for place in places)
-            best = min(best, (max(max(begin, task.release) + seconds, task.earliest), uav_id))
+            start = max(max(begin, task.release) + seconds, task.earliest)
+            if not at_best and start < best[0]:
+                start = self._first_start(task, uav_id, begin)
+            best = min(best, (start, uav_id))
             if best[0] <= enough:
                 break
         return best
+
+    def _first_start(self, task: Task, uav_id: str, stamp: float) -> float:
+        """When a known UAV is predicted to start a task that it flies first and straight."""
+        flight = self._flights.of(uav_id, stamp)
+        assert flight is not None
+        stop = ListStop(task, Leg((), 0.0), 0.0)
+        ways = (stop, replace(stop, reversed=True)) if task.reversible else (stop,)
+        return stamp + min(timed_stops((way,), flight)[0].start for way in ways)
 
     def _has_payload(self, task: Task, report: UavReport) -> bool:
         """Whether a UAV has the payload of an accepted task on board, or could take it on."""

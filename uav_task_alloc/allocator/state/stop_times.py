@@ -131,6 +131,34 @@ def _leg_seconds(stop: ListStop, flight: UavFlight, place: Point, start: Point |
     return flight.pace.from_stop((place, *rest), flight.share(rest[0]))
 
 
+def first_leg_delay(stops: Sequence[ListStop], flight: UavFlight, speed: float) -> float:
+    """Return what a UAV loses on its first leg: it takes off, climbs, speeds up and brakes.
+
+    A solver flies that leg at once and at full speed; it counts a stop after each task only.
+
+    Args:
+        stops: of the list in force; none: it is not known where the UAV will fly.
+        flight: of the UAV now.
+        speed: [m/s] mean over ground, as of the solver.
+
+    Returns:
+        [s]; 0.0 of a UAV that has reached its first task.
+    """
+    if stops and flight.serving == stops[0].task.id:
+        return 0.0
+    pace = replace(flight.pace, speed=speed, wind=(0.0, 0.0))
+    flight = replace(flight, pace=pace)
+    if stops:
+        leg = *stops[0].leg.via, stops[0].entry
+        rest = leg[flight.passed(leg):]
+        lost = _leg_seconds(stops[0], flight, flight.position, None, first=True)
+        return max(0.0, lost - pace.seconds((flight.position, *rest)))
+    if not (flight.on_ground or flight.climbing):
+        return pace.stop_time * (0.5 if flight.velocity is None else 1.0)
+    climb = max(0.0, flight.takeoff_top - flight.position[2]) / pace.climb
+    return pace.takeoff * flight.on_ground + climb + pace.stop_time
+
+
 def finish_time(each: UavList, flight: UavFlight) -> float:
     """Return the time until a UAV has flown a list, with its way home.
 
