@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the solver of the allocator counts as time: first legs and stops."""
+"""What the solver of the allocator counts as time: first legs, stops, services under way."""
 import pytest
 from allocation import AllocatorDriver
 
@@ -57,3 +57,15 @@ def test_a_deadline_that_only_the_stop_breaks_is_unassigned_with_when_it_could_s
     assert ('a' in made.lists, made.state('t')) == (False, 'UNASSIGNED')
     assert made.reason('t').startswith(
         'latest 1102.0 s cannot be kept: no UAV can start it before 1104.1 s (a)')
+
+
+def test_of_a_service_under_way_only_the_rest_delays_the_next_task(made):
+    uav(made, velocity=HOVERS)
+    made.add(at('long', 0, service_time=60.0))
+    made.settle()
+    for seconds in (0.0, 50.0):
+        made.now += seconds
+        uav(made, velocity=HOVERS, active_task='long')
+    made.add(at('next', 500, latest=made.now + 70.0))  # 10 s, 50 s of flight and 4 s of a stop
+    made.settle()
+    assert made.route('a') == ('long', 'next')

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -18,8 +18,9 @@ from uav_task_alloc.allocator.replanning.held_deadlines import (
     with_deadlines_held,
     with_true_values,
 )
+from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs, with_later_trips
-from uav_task_alloc.allocator.state.stop_times import first_leg_delay, way_ahead
+from uav_task_alloc.allocator.state.stop_times import first_leg_delay, timed_stops, way_ahead
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan, Point, Task, Uav
 from uav_task_alloc.params import AllocatorParams
@@ -47,6 +48,7 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
     later = dict[str, Uav]()
     if counts_time(uavs, tasks, objective, params.trips):
         uavs = tuple(measured_uav(world, uav, stamp) for uav in uavs)
+        tasks = _tasks_under_way(world, tasks, locked, stamp)
         later = {uav_id: uav for uav_id, uav in waiting_uavs(world, stamp).items()
                  if not world.usable(uav_id)}
         uavs += tuple(later.values())
@@ -70,6 +72,19 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         objective=objective, trips=params.trips, stamp=stamp, stop_time=stop_time,
         since={task.id: records[task.id].since for task in tasks}, outlook=outlook,
         too_high=too_high, later_only=frozenset(later))
+
+
+def _tasks_under_way(world: World, tasks: Iterable[Task], locked: TaskIdsByUav,
+                     stamp: float) -> tuple[Task, ...]:
+    """Tasks, of those that are served at points only the rest of the service."""
+    rests = dict[str, float]()
+    for uav_id, ids in locked.items():
+        stops, flight = world.list_of(uav_id).stops, world.flights.of(uav_id, stamp)
+        if flight and stops and ids[:1] == (flight.serving,) == (stops[0].task.id,):
+            first = timed_stops(stops[:1], flight)[0]
+            rests[flight.serving] = max(0.0, first.task.stay - first.served)
+    return tuple(replace(task, service_time=rests[task.id], actions=())
+                 if task.id in rests and not task.path else task for task in tasks)
 
 
 def ways_under_way(world: World) -> dict[str, tuple[Point, ...]]:
