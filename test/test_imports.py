@@ -74,7 +74,7 @@ LEVELS = {
     'allocator.work_records': 3,
     'allocator.records': 3,
     'allocator.list_records': 3,
-    'allocator.replan_records': 3,
+    'allocator.replan_records': 4,  # with flights of the state
     'allocator.state': 4,
     'allocator.replanning': 5,
     'allocator.persistence': 6,

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from uav_task_alloc.allocator.state.flight_pace import UavFlight
 from uav_task_alloc.model import Plan, Point, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective
 
@@ -35,6 +36,8 @@ class ReplanProblem:
     stop_time: float = 0.0  # [s] that braking and accelerating cost at each task
     outlook: FleetOutlook | None = None  # None: the next tasks do not count
     too_high: Mapping[str, str] = field(default_factory=dict)  # for which UAVs; by task id
+    # by UAV id: how each flies now; a service under way is in `tasks` as far as it is left
+    flights: Mapping[str, UavFlight] = field(default_factory=dict)
     later_only: frozenset[str] = frozenset()  # ids of UAVs whose batteries are changed first
 
 

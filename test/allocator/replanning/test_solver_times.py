@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the solver of the allocator counts as time: first legs, stops, services under way."""
+"""What the solver of the allocator counts as time, and what the prediction makes of it."""
+from dataclasses import replace
+
 import pytest
 from allocation import AllocatorDriver
 
@@ -69,3 +71,29 @@ def test_of_a_service_under_way_only_the_rest_delays_the_next_task(made):
     made.add(at('next', 500, latest=made.now + 70.0))  # 10 s, 50 s of flight and 4 s of a stop
     made.settle()
     assert made.route('a') == ('long', 'next')
+
+
+def windy(made, monkeypatch, *others):
+    """UAVs at 0 and further on [m]; the wind has been measured, against those that fly east."""
+    for uav_id, x in (('a', 0.0), *others):
+        made.uav(uav_id, x, 0.0, 50.0, cruise_speed=10.0, velocity=HOVERS)
+    monkeypatch.setattr(made.world.flights.wind, 'of', lambda _, speed: (speed, (-4.0, 0.0)))
+
+
+@pytest.mark.parametrize('objective', ['distance', 'balanced'])
+def test_a_deadline_that_the_wind_breaks_goes_to_a_uav_that_keeps_it(made, monkeypatch, objective):
+    made.world.params = replace(made.world.params, objective=objective)
+    windy(made, monkeypatch, ('b', 1050.0))
+    made.add(at('t', 500, latest=made.now + 75.0))  # 83 s of flight, or 39 s
+    made.settle()
+    assert made.route('b') == ('t',)
+    assert 't' not in made.world.deadlines.late
+
+
+def test_a_deadline_that_the_wind_breaks_for_all_is_unassigned(made, monkeypatch):
+    windy(made, monkeypatch)
+    made.add(at('t', 500, latest=made.now + 75.0))
+    made.settle()
+    assert ('a' in made.lists, made.state('t')) == (False, 'UNASSIGNED')
+    assert made.reason('t').startswith(
+        'latest 1075.0 s cannot be kept: no UAV can start it before 1087.4 s (a)')

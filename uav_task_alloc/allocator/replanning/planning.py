@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.replan_records import FleetOutlook, ReplanAnswer, ReplanProblem
+from uav_task_alloc.allocator.replanning.deadline_reserves import plan_in_time
 from uav_task_alloc.allocator.replanning.from_now import counts_time, from_now, objective_of
 from uav_task_alloc.allocator.replanning.height_limits import (
     with_height_limits,
@@ -71,7 +72,9 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         warm=replace(best, reversed=best.reversed - under_way.keys()),
         objective=objective, trips=params.trips, stamp=stamp, stop_time=stop_time,
         since={task.id: records[task.id].since for task in tasks}, outlook=outlook,
-        too_high=too_high, later_only=frozenset(later))
+        too_high=too_high, later_only=frozenset(later), flights={
+            uav.id: replace(flight, served=0.0) for uav in uavs if uav.id not in later
+            and (flight := world.flights.of(uav.id, stamp))})
 
 
 def _tasks_under_way(world: World, tasks: Iterable[Task], locked: TaskIdsByUav,
@@ -160,11 +163,14 @@ def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: All
         Both plans; the best is the repaired one where nothing better was found. With an outlook,
         also the plan to publish.
     """
-    problem = from_now(problem)
-    repaired = _solved(plan, problem, params, stop, problem.published, 0, problem.tasks)
-    tasks = with_deadlines_held(problem, repaired)
-    best = _solved(plan, problem, params, stop,
-                   problem.warm if problem.background else repaired, None, tasks)
+    given, problem = problem, from_now(problem)
+    repaired, tasks = plan_in_time(given, problem.tasks, lambda tasks, _: _solved(
+        plan, problem, params, stop, problem.published, 0, tasks))
+    problem = replace(problem, tasks=tuple(tasks))
+    first = problem.warm if problem.background else repaired
+    best, tasks = plan_in_time(
+        given, with_deadlines_held(problem, repaired), lambda tasks, before: _solved(
+            plan, problem, params, stop, before or first, 0 if before else None, tasks))
     if tasks is not problem.tasks:
         best = with_true_values(best, problem.tasks)
     answer = ReplanAnswer(problem, repaired, best)
@@ -182,8 +188,9 @@ def repaired_plan(plan: Callable[..., Plan], problem: ReplanProblem, params: All
     Args:
         plan, problem, params, stop: as of `solve_problem`.
     """
-    problem = from_now(problem)
-    return _solved(plan, problem, params, stop, problem.published, 0, problem.tasks)
+    given, problem = problem, from_now(problem)
+    return plan_in_time(given, problem.tasks, lambda tasks, _: _solved(
+        plan, problem, params, stop, problem.published, 0, tasks))[0]
 
 
 def _solved(plan: Callable[..., Plan], problem: ReplanProblem, params: AllocatorParams,
