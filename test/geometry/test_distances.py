@@ -72,6 +72,18 @@ def test_a_point_inside_a_zone_can_be_left_but_not_reached():
     assert (found.zones_around(0), found.zones_around(1)) == (('z',), ())
 
 
+def test_known_lengths_are_read_without_a_search():
+    zone = ThreatZone.cylinder('z', (0, 0), 50)
+    found = Distances([(10, 0, 5), (300, 0, 5), (300, 90, 5)], [zone])
+    origins, goals = [0, 1, 1, 2, 2], [1, 0, 2, 1, 2]
+    assert np.array_equal(found.known_lengths(origins, goals),
+                          [math.nan, math.inf, math.nan, math.nan, 0.0], equal_nan=True)
+    found.ensure([1], [2])
+    assert np.array_equal(found.known_lengths(origins, goals),
+                          [math.nan, math.inf, 90.0, 90.0, 0.0], equal_nan=True)
+    assert Distances([(0, 0, 0), (3, 4, 0)]).known_lengths([0], [1]).tolist() == [5.0]
+
+
 def test_changed_zones_invalidate_only_the_paths_they_cut(scene):
     zones, points = scene
     before = distances_among(points, zones)

@@ -83,6 +83,26 @@ def test_the_reason_of_a_task_that_nobody_can_reach_in_time_finds_all_kernels_lo
     assert run(LATE).stdout == 'True\nlate:\n'
 
 
+CLOSED = LOADED + """
+load_kernels(zones=True, search=False)
+load_timed_kernels(zones=True, search=False)
+before = loaded()
+ring = [ThreatZone.polygon(f'z{k}', corners) for k, corners in enumerate((
+    ((-9.0, -9.0), (9.0, -9.0), (9.0, -8.0), (-9.0, -8.0)),
+    ((-9.0, 8.0), (9.0, 8.0), (9.0, 9.0), (-9.0, 9.0)),
+    ((-9.0, -9.0), (-8.0, -9.0), (-8.0, 9.0), (-9.0, 9.0)),
+    ((8.0, -9.0), (9.0, -9.0), (9.0, 9.0), (8.0, 9.0))))]
+for objective in ('distance', 'finish'):
+    print(*plan([Uav('u', (50.0, 0.0, 0.0))], [Task('t', (0.0, 0.0, 0.0))], ring,
+                objective=objective, budget=9.0, max_iterations=0).unassigned.values())
+print('late:', *sorted(loaded() - before))
+"""
+
+
+def test_the_reason_of_a_task_that_no_path_leads_to_finds_all_kernels_loaded():
+    assert run(CLOSED).stdout == 2 * 'unreachable: no safe path past the zones\n' + 'late:\n'
+
+
 SELECTED = LOADED + """
 load_timed_kernels()
 before = loaded()

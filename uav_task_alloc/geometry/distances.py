@@ -14,13 +14,14 @@ from numpy.typing import ArrayLike
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import as_points, check_limits, path_between
-from uav_task_alloc.geometry.obstacles import Obstacles, containing_zones, pack
+from uav_task_alloc.geometry.obstacles import Floats, Obstacles, containing_zones, pack
 from uav_task_alloc.geometry.pairs import (
     CACHE_SIZE,
     Pairs,
     ensure_lengths,
     known_length,
     length,
+    read_known_lengths,
     take_path,
 )
 from uav_task_alloc.geometry.path_store import PathStore
@@ -197,8 +198,26 @@ class Distances:
 
     def given_up(self, i: int, j: int) -> bool:
         """Whether the path from i to j was not found in the time; there may be one."""
-        return bool(self.zones) and not known_length(self.pairs, i, j) >= 0.0 and (
-            bool(self._scene.location[j] != INSIDE) and i != j)
+        return bool(np.isnan(self.known_lengths([i], [j])[0]))
+
+    def known_lengths(self, origins: ArrayLike, goals: ArrayLike) -> Floats:
+        """Lengths of paths without a search for them.
+
+        Args:
+            origins: (n,) indices of points.
+            goals: (n,) indices of points.
+
+        Returns:
+            float64 (n,) [m]; inf: there is no path, NaN: it was not searched for yet, or not found
+            in the time.
+        """
+        start, end = (np.asarray(each, dtype=np.int64).ravel() for each in (origins, goals))
+        known = np.empty(start.size)
+        read_known_lengths(self.pairs, start, end, known)
+        known[known < 0.0] = math.nan
+        known[np.isnan(known) & (self._scene.location[end] == INSIDE)] = math.inf
+        known[start == end] = 0.0
+        return known
 
     def is_inside(self, i: int) -> bool:
         """Whether point i is inside an enlarged zone."""

@@ -155,6 +155,20 @@ def known_length(pairs: Pairs, i: int, j: int) -> float:
     return np.nan
 
 
+@allocating_kernel
+def read_known_lengths(pairs: Pairs, origins: Ints, goals: Ints, known: Floats) -> None:
+    """Write `known_length` of many pairs, without a search.
+
+    Args:
+        pairs: arrays of `Distances`.
+        origins: int64 (m,), points to start from.
+        goals: int64 (m,), points to reach.
+        known: float64 (m,) [m], the result; NaN or negative: not known.
+    """
+    for m in range(origins.size):
+        known[m] = known_length(pairs, origins[m], goals[m])
+
+
 @inner_allocating_kernel
 def _store_length(pairs: Pairs, i: int, j: int, found: float) -> None:
     """Store the length of a path from i to j, which is outside all zones. O(1)"""

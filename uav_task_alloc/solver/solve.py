@@ -28,6 +28,7 @@ from uav_task_alloc.solver.check import (
 from uav_task_alloc.solver.insertion import place_all
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
 from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
+from uav_task_alloc.solver.reasons import load_reasons
 from uav_task_alloc.solver.recombine import load_recombination
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
@@ -196,6 +197,7 @@ def _call_kernels(solver: str, zones: bool, search: bool) -> None:
     recorder = Recorder(lambda: 0.0, 0.0, 1.0, max_iterations=rounds, problem=problem)
     SOLVERS[solver](recorder, 0, None)
     to_plan(problem, recorder, '', False)
+    load_reasons(problem)
     place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two are only called
     if rounds:
         trim_to_range(problem.arrays, recorder.best)  # where ranges do not suffice

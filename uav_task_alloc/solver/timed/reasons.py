@@ -10,7 +10,7 @@ import numpy as np
 from uav_task_alloc.errors import counted
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import kernel
-from uav_task_alloc.solver.reasons import lasting_reason, way_reason
+from uav_task_alloc.solver.reasons import lasting_reason
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.legs import leg_of
@@ -18,6 +18,7 @@ from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
 from uav_task_alloc.solver.timed.visits import BASE_BEFORE, free_visit, split_cost
 from uav_task_alloc.solver.timed.ways import directions, face, has_paths, service_of
+from uav_task_alloc.solver.way_reasons import WayReasons
 
 _ARRIVAL, _LATE, _LENGTH, _SECONDS, _END = range(5)  # columns of needs_alone
 _NAMED = 3  # UAVs that a text names
@@ -78,19 +79,21 @@ def timed_reasons(problem: TimedProblem, missing: Sequence[int]) -> dict[str, st
     """
     if not missing:
         return {}
-    routes = empty_timed_routes(problem.arrays)
-    return {problem.base.tasks[i].id: _reason(problem, routes, i) for i in missing}
+    routes, ways, scarce = (empty_timed_routes(problem.arrays), WayReasons(problem.base),
+                            _scarce(problem))
+    return {problem.base.tasks[i].id: _reason(problem, routes, ways, scarce, i) for i in missing}
 
 
-def _reason(problem: TimedProblem, routes: TimedRoutes, i: int) -> str:
+def _reason(problem: TimedProblem, routes: TimedRoutes, ways: WayReasons, scarce: str,
+            i: int) -> str:
     a, base = problem.arrays, problem.base
-    fixed = lasting_reason(base, i) or way_reason(base, i)
+    fixed = lasting_reason(base, i) or ways.reason(i)
     if fixed:
         return fixed
     if can_serve(a, routes, a.uavs + i):
         if problem.prizes:
             return 'left out: it is not worth its way'
-        return f'left out: {_scarce(problem)} do not suffice for all tasks'
+        return f'left out: {scarce} do not suffice for all tasks'
     return _load_reason(problem, i) or _needs_reason(problem, routes, i)
 
 
@@ -138,16 +141,15 @@ def _needs_reason(problem: TimedProblem, routes: TimedRoutes, i: int) -> str:
     """The reason of a task that windows, ranges, endurances or availabilities prevent."""
     a, base, task = problem.arrays, problem.base, problem.base.tasks[i]
     needs = _least_needs(problem, routes, i)
-    able = [int(u) for u in np.flatnonzero(a.compatible[0, :, i])]
-    if not able:
+    able = np.flatnonzero(a.compatible[0, :, i])
+    if not able.size:
         return f'payload {task.payload:g} kg: no UAV on the ground may serve it'
-    late = [u for u in able if needs[u, _LATE] > 0.0]
-    if len(late) == len(able) and not a.visits:
-        first = min(able, key=lambda u: float(needs[u, _ARRIVAL]))
+    if (needs[able, _LATE] > 0.0).all() and not a.visits:
+        first = int(able[np.argmin(needs[able, _ARRIVAL])])
         return (f'latest {task.latest:.0f} s; the earliest arrival is '
                 f'{needs[first, _ARRIVAL]:.0f} s ({base.uavs[first].id})')
-    able.sort(key=lambda u: float(needs[u, _LENGTH]))
-    texts = [_lack(problem, i, u, needs[u]) for u in able[:_NAMED]]
+    able = able[np.argsort(needs[able, _LENGTH], kind='stable')]
+    texts = [_lack(problem, i, u, needs[u]) for u in able[:_NAMED].tolist()]
     more = f'; nor {counted(len(able) - _NAMED, "other")}' if len(able) > _NAMED else ''
     return 'no UAV can serve it: ' + '; '.join(texts) + more
 

@@ -21,6 +21,7 @@ from uav_task_alloc.model import Plan, Task, ThreatZone, Uav, turned_tasks
 from uav_task_alloc.solver.chain_q import run_colonies
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.reasons import load_reasons
 from uav_task_alloc.solver.recombine import load_packing
 from uav_task_alloc.solver.timed.answer import to_timed_plan
 from uav_task_alloc.solver.timed.colony import (
@@ -193,6 +194,7 @@ def _call_kernels(zones: bool, search: bool, paths: bool, large: bool, few: bool
     _improve(recorder, 0, WarmState(), None)
     to_timed_plan(problem, recorder, recorder.best, '', False)  # with the reason of the last task
     timed_reasons(problem, [0])
+    load_reasons(problem.base)
     if search and not paths:
         best_label(problem.arrays, empty_timed_routes(problem.arrays), 0,
                    empty_labels(len(tasks), 1), 1.0, 1.0)
