@@ -8,8 +8,11 @@ import secrets
 import shutil
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+_TEMPORARY = '.uav_task_alloc_'  # before 8 hexadecimal digits and the suffix of the result
+_MOST_LINKS = 40  # that lead to one another, as of Linux
 
 
 def replace_file(path: Path, text: str) -> None:
@@ -39,9 +42,11 @@ def replace_file(path: Path, text: str) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Within `with`, a result is written beside a file, which it replaces once it is complete.
 
-    A link, a pipe and a device are written themselves, as is a file in a folder in which no
-    other one can be made. A file whose name cannot be given to another one, as of another user
-    in /tmp, or a mount point, is overwritten at the end. Nothing is synced to disk.
+    A link stays, the file that it leads to is replaced; other names of the same file (hard links)
+    keep the old content. A pipe and a device are written themselves, as is a file in a folder in
+    which no other one can be made. A file whose name cannot be given to another one, as of another
+    user in /tmp, or a mount point, is overwritten at the end. Nothing is synced to disk. What
+    killed processes have left beside the file is removed.
 
     Args:
         path: of the file; where `with` is left by an exception, it stays as it was.
@@ -52,23 +57,56 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
         OSError: the file cannot be replaced.
     """
-    if path.is_symlink() or not _writable(path.parent) or (
-            path.exists() and not (path.is_file() and _writable(path))):
+    target = _link_target(path)
+    if target.is_symlink() or not _writable(target.parent) or (
+            target.exists() and not (target.is_file() and _writable(target))):
         yield path
         return
-    temporary = path.with_name(f'.uav_task_alloc_{secrets.token_hex(4)}{path.suffix}')
+    _remove_stale(target.parent)
+    temporary, descriptor = _locked_file(target.parent, path.suffix)
     try:
         yield temporary
-        if path.exists():
-            shutil.copymode(path, temporary)
+        if target.exists():
+            shutil.copymode(target, temporary)
         try:
-            os.replace(temporary, path)
+            os.replace(temporary, target)
         except OSError:
-            shutil.copyfile(temporary, path)
+            shutil.copyfile(temporary, target)
             temporary.unlink()
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+    finally:
+        os.close(descriptor)
+
+
+def _link_target(path: Path) -> Path:
+    """The file that a link leads to; a link of the system, as /dev/stdout, where it is one."""
+    for _ in range(_MOST_LINKS):
+        if not path.is_symlink() or path.parent.resolve().parts[1:2] in (('dev',), ('proc',)):
+            break
+        path = path.parent / path.readlink()
+    return path
+
+
+def _locked_file(folder: Path, suffix: str) -> tuple[Path, int]:
+    """A new file, and a descriptor that has it locked until it is closed, or the process ends."""
+    while True:
+        path = folder / f'{_TEMPORARY}{secrets.token_hex(4)}{suffix}'
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+        with suppress(OSError):  # where a file system has no locks, none removes it either
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        if path.exists():
+            return path, descriptor
+        os.close(descriptor)  # another process has removed it before it was locked
+
+
+def _remove_stale(folder: Path) -> None:
+    """Remove the files of `_locked_file` whose processes have ended."""
+    for path in folder.glob(_TEMPORARY + 8 * '[0-9a-f]' + '*'):
+        with suppress(OSError), open(path, 'r+b') as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            path.unlink()
 
 
 def _writable(path: Path) -> bool:

@@ -231,6 +231,77 @@ def test_a_link_stays_a_link_to_the_file_that_is_written(tmp_path):
     assert (tmp_path / 'plan.json').read_text() == 'new'
 
 
+def _write_half(file):
+    file.write_text('half')
+    raise ZeroDivisionError
+
+
+def test_a_result_that_fails_leaves_the_file_that_a_link_leads_to(tmp_path):
+    (tmp_path / 'far').mkdir()
+    (tmp_path / 'far/plan.json').write_text('old')
+    (tmp_path / 'near.json').symlink_to('far/plan.json')
+    (tmp_path / 'link.json').symlink_to(tmp_path / 'near.json')
+    with pytest.raises(ZeroDivisionError), replacing(tmp_path / 'link.json') as file:
+        _write_half(file)
+    assert (tmp_path / 'link.json').read_text() == 'old'
+    with replacing(tmp_path / 'link.json') as file:
+        file.write_text('new')
+    assert (tmp_path / 'link.json').is_symlink()
+    assert (tmp_path / 'near.json').is_symlink()
+    assert (tmp_path / 'far/plan.json').read_text() == 'new'
+    assert [each.name for each in (tmp_path / 'far').iterdir()] == ['plan.json']
+
+
+def test_a_result_for_standard_output_goes_behind_what_a_file_has_of_it(tmp_path):
+    script = ('from pathlib import Path; from uav_task_alloc.atomic_files import replacing\n'
+              "with replacing(Path('/dev/stdout')) as file:\n"
+              "    with file.open('a') as stream:\n        stream.write('result')")
+    (tmp_path / 'out').write_text('printed ')
+    with (tmp_path / 'out').open('a') as out:
+        subprocess.run([sys.executable, '-c', script], stdout=out, cwd=ROOT, check=True)
+    assert (tmp_path / 'out').read_text() == 'printed result'
+
+
+def test_links_that_lead_to_one_another_are_an_error(tmp_path):
+    (tmp_path / 'a').symlink_to('b')
+    (tmp_path / 'b').symlink_to('a')
+    with pytest.raises(OSError, match='symbolic links'), replacing(tmp_path / 'a') as file:
+        file.write_text('new')
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from uav_task_alloc.atomic_files import replacing
+with replacing(Path(sys.argv[1])) as file:
+    file.write_text('half')
+    if sys.argv[2] == 'killed':
+        os.kill(os.getpid(), signal.SIGKILL)
+    print('writes', flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_what_killed_processes_have_left_is_removed_and_what_others_write_is_not(tmp_path):
+    path = tmp_path / 'plan.json'
+    path.write_text('old')
+    for _ in range(3):
+        subprocess.run([sys.executable, '-c', KILLED, str(path), 'killed'], cwd=ROOT)
+    left = set(tmp_path.iterdir()) - {path}
+    assert len(left) >= 1
+    assert path.read_text() == 'old'
+    with subprocess.Popen([sys.executable, '-c', KILLED, str(tmp_path / 'map.svg'), 'waits'],
+                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=ROOT) as other:
+        other.stdout.readline()
+        with replacing(path) as file:
+            file.write_text('new')
+        assert not left & set(tmp_path.iterdir())
+        assert path.read_text() == 'new'
+        other.communicate()
+    assert (tmp_path / 'map.svg').read_text() == 'half'
+    assert sorted(each.name for each in tmp_path.iterdir()) == ['map.svg', 'plan.json']
+
+
 def test_a_file_in_a_folder_that_is_read_only_is_written(read_only_folder):
     user = os.geteuid()
     if user == NOBODY:  # the fixture is root otherwise
