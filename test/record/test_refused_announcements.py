@@ -69,6 +69,9 @@ def test_an_update_to_another_kind_or_to_a_time_that_has_passed_moves_nothing(mo
     ('ADD', 'REJECTED', {}, ['announced: t1']),
     ('ADD', 'ASSIGNED', {'id': 't9'}, ['announced: t9']),
     ('CANCEL', 'ASSIGNED', {}, ['to be withdrawn: t1']),
+    ('CANCEL', 'FAILED', {}, ['to be withdrawn: t1']),
+    ('CANCEL', 'REJECTED', {}, []),
+    ('CANCEL', 'ASSIGNED', {'id': 't9'}, []),
     ('CANCEL', 'CANCELLED', {}, [])])
 def test_only_what_may_change_a_task_is_an_event(action, state, more, texts):
     run = RunState()
@@ -79,10 +82,45 @@ def test_only_what_may_change_a_task_is_an_event(action, state, more, texts):
     assert [text for _, text in sentences(run, line)] == texts
 
 
-def test_a_change_before_the_first_statuses_is_an_event():
-    line = {'kind': 'announcement', 'wall': 3.0, 'action': 'UPDATE',
-            'tasks': [{'id': 't1', 'position': [900.0, 0.0, 50.0]}]}
-    assert [text for _, text in sentences(RunState(), line)] == ['changed: t1']
+def texts_of(run, action, task_id='t1'):
+    line = {'kind': 'announcement', 'wall': 3.0, 'action': action,
+            'tasks': [{'id': task_id, 'position': [900.0, 0.0, 50.0]}]}
+    return [text for _, text in sentences(run, line)]
+
+
+@pytest.mark.parametrize(('action', 'text'), [
+    ('UPDATE', 'changed: t1'), ('CANCEL', 'to be withdrawn: t1')])
+def test_a_change_before_the_first_statuses_is_an_event(action, text):
+    assert texts_of(RunState(), action) == [text]
+    run = RunState()
+    run.apply({'kind': 'statuses', 'wall': 1.0, 'statuses': [
+        {'task': 't2', 'state': 'ASSIGNED', 'uav': '', 'reason': ''}]})
+    assert texts_of(run, action) == []
+    announce(run, 'ADD', 100.0, 2.0)
+    assert texts_of(run, action) == [text]
+
+
+@pytest.mark.parametrize(('action', 'text'), [
+    ('UPDATE', 'changed: t1'), ('CANCEL', 'to be withdrawn: t1')])
+def test_a_change_of_a_refused_task_is_an_event_once_it_was_announced_again(action, text):
+    run = RunState()
+    announce(run, 'ADD', 100.0, 1.0)
+    status(run, 'REJECTED')
+    announce(run, 'UPDATE', 200.0, 2.0)
+    assert texts_of(run, action) == []
+    announce(run, 'ADD', 300.0, 3.0)
+    assert texts_of(run, action) == [text]
+    status(run, 'REJECTED')  # so was the second one
+    assert texts_of(run, action) == []
+
+
+def test_the_withdrawal_of_a_piece_is_an_event():
+    run = RunState()
+    run.apply({'kind': 'statuses', 'wall': 1.0, 'statuses': [
+        {'task': 'a1', 'state': 'ASSIGNED', 'uav': '', 'reason': ''},
+        {'task': 'a1#1', 'state': 'ASSIGNED', 'uav': '', 'reason': ''}]})
+    assert texts_of(run, 'CANCEL', 'a1#1') == ['to be withdrawn: a1#1']
+    assert texts_of(run, 'CANCEL', 'a1#2') == []
 
 
 def zone_message(zone_id, margin):

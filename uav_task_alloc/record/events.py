@@ -48,13 +48,15 @@ def _changes_nothing(state: RunState, line: Line, row: Line) -> bool:
     """Whether an allocator refuses what is announced of a task, or has done it before."""
     task_id, action = row['id'], line['action']
     known, status = state.tasks.get(task_id), state.statuses.tasks.get(task_id)
-    if action == 'CANCEL':
-        return status is not None and status.state in ('COMPLETED', 'CANCELLED')
-    if action == 'UPDATE' and status is None:  # not announced, or forgotten
+    if action == 'ADD':
+        return known is not None and status is not None and status.state != 'REJECTED'
+    if state.statuses.is_refused(task_id):
+        return True
+    if state.statuses.in_newest(task_id) is None:  # not announced, or forgotten
         return state.statuses.is_forgotten(task_id) or (
             known is None and bool(state.statuses.tasks))
-    if action == 'UPDATE' and status is not None and status.state == 'REJECTED':
-        return True
+    if action == 'CANCEL':
+        return status is not None and status.state in ('COMPLETED', 'CANCELLED')
     now = line['wall'] - state.allocators.lead.seconds
     return known is not None and status is not None and is_refused(
         known, status, row, action, now)

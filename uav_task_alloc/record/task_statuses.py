@@ -23,6 +23,7 @@ class TaskStatuses:
         self._pieces: dict[str, ReportedStatus] = {}  # likewise
         self._forgotten: dict[str, ReportedStatus] = {}  # tasks, by id
         self._flown_pieces: dict[str, ReportedStatus] = {}  # forgotten, by id of the piece
+        self._again: set[str] = set()  # ids of refused tasks, announced again since then
 
     def apply(self, line: Line) -> None:
         """Take the statuses of all tasks.
@@ -40,6 +41,7 @@ class TaskStatuses:
             del self._forgotten[task]
         self._flown_pieces = {piece: row for piece, row in self.known_pieces().items()
                               if row.state == 'COMPLETED' and piece not in rows}
+        self._again.clear()
         self._pieces = {name: row for name, row in rows.items() if split_piece(name)[1]}
         self.tasks = {name: row for name, row in rows.items() if name not in self._pieces}
 
@@ -52,6 +54,7 @@ class TaskStatuses:
         Returns:
             Whether there was one: what is announced is a new task.
         """
+        self._again.add(task)
         if self._forgotten.pop(task, None) is None:
             return False
         self._flown_pieces = {piece: row for piece, row in self._flown_pieces.items()
@@ -61,6 +64,11 @@ class TaskStatuses:
     def in_newest(self, name: str) -> ReportedStatus | None:
         """The status in the newest message; None: it is not in it."""
         return self.tasks.get(name) or self._pieces.get(name)
+
+    def is_refused(self, task: str) -> bool:
+        """Whether a task was refused, and was not announced again since the newest message."""
+        status = self.tasks.get(task)
+        return status is not None and status.state == 'REJECTED' and task not in self._again
 
     def is_forgotten(self, task: str) -> bool:
         """Whether a task was in an earlier message, and is not in the newest."""
