@@ -71,17 +71,24 @@ class TaskRegistry:
         """Accept a new task; a replay changes nothing, another task with a known id is refused."""
         known = self.records.get(task.id)
         if known is None and self.open_count >= MAX_OPEN:
-            return self.reject(task.id, f'open tasks = {MAX_OPEN}: expected fewer', stamp)
+            return self._no_room(task, stamp)
         if known is None:
-            rule = rule_for(TaskState.REJECTED, TaskTransition.ADD)
-            self.rejected.pop(task.id, None)
-            self._put(TaskRecord(task, task, stamp=stamp, reason=rule.reason, since=stamp))
+            self.add_new(task, stamp)
             return TaskVerdict(task.id, True)
         ended = '' if known.open else f': it is {known.state.name}'
         if task in (known.task, known.announced):
             return TaskVerdict(task.id, True, UNCHANGED + ended)
         return TaskVerdict(task.id, False,
                        f'duplicate id: another task was announced under it{ended}')
+
+    def add_new(self, task: Task, stamp: float) -> None:
+        """Record a task of a new id, as a piece for which there is room."""
+        rule = rule_for(TaskState.REJECTED, TaskTransition.ADD)
+        self.rejected.pop(task.id, None)
+        self._put(TaskRecord(task, task, stamp=stamp, reason=rule.reason, since=stamp))
+
+    def _no_room(self, task: Task, stamp: float) -> TaskVerdict:
+        return self.reject(task.id, f'open tasks = {MAX_OPEN}: expected fewer', stamp)
 
     def add_completed(self, task: Task, uav: str, stamp: float) -> None:
         """Record a new task that is completed already, by that UAV; also where no more is open."""
@@ -93,6 +100,9 @@ class TaskRegistry:
         known = self.records.get(task.id)
         if known is not None and task == known.task and known.open:
             return TaskVerdict(task.id, True, UNCHANGED)
+        if (known is not None and known.state is TaskState.FAILED
+                and self.open_count >= MAX_OPEN):
+            return self._no_room(task, stamp)
         why = self.step(task.id, TaskTransition.UPDATE, stamp, known.uav if known else '',
                         known.reason if known else '', task=task, failed_on=())
         return self._verdict(task.id, why, stamp)

@@ -80,7 +80,7 @@ class Works:
             return self._tasks.reject(work.task.id, whys[0], stamp)
         self._tasks.rejected.pop(work.task.id, None)
         for piece in pieces:
-            self._tasks.add(piece, stamp)
+            self._tasks.add_new(piece, stamp)
         self._put(WorkRecord(work, work, tuple(piece.id for piece in pieces), len(pieces)))
         return TaskVerdict(work.task.id, True)
 
@@ -119,7 +119,7 @@ class Works:
         if whys and all(whys):
             return TaskVerdict(known.id, False, whys[0])
         matched = self._matched(new, pieces)
-        if not self._has_room(new, matched):
+        if not self._has_room(new, matched, renew=True):
             return TaskVerdict(known.id, False, _no_room())
         self._recut(new, matched, stamp, 'changed', renew=True)
         return TaskVerdict(known.id, True)
@@ -191,12 +191,16 @@ class Works:
         wide = [record for record in self._flown(known) if not _is_narrow(known, record.task.id)]
         return match_pieces(pieces, unflown, wide)
 
-    def _has_room(self, known: WorkRecord, matched: Sequence[MatchedPiece]) -> bool:
-        """Whether the new pieces of a cut may be open beside all other tasks."""
-        if all(found.known for found in matched):
-            return True
-        others = self._tasks.open_count - sum(record.open for record in self._present(known))
-        return others + sum(not found.flown for found in matched) <= MAX_OPEN
+    def _has_room(self, known: WorkRecord, matched: Sequence[MatchedPiece],
+                  renew: bool = False) -> bool:
+        """Whether a cut opens no more pieces than there are, or than may be open with all tasks.
+
+        `renew`: pieces that have failed are opened again.
+        """
+        before = {record.task.id for record in self._present(known) if record.open}
+        after = sum(not found.flown and (renew or not found.known or found.known in before)
+                    for found in matched)
+        return after <= max(len(before), MAX_OPEN - self._tasks.open_count + len(before))
 
     def _recut(self, known: WorkRecord, matched: Sequence[MatchedPiece], stamp: float, why: str,
                renew: bool = False) -> bool:
@@ -206,7 +210,7 @@ class Works:
         ended = [each for each in known.pieces if each in present and each not in stay
                  and present[each].state is TaskState.COMPLETED]
         gone = [each for each in present if each not in stay and each not in ended]
-        for each in gone:  # first, as they make room for the others
+        for each in gone:
             self._tasks.step(each, TaskTransition.REPLACE, stamp, why=why)
         kept, last, changed = list[str](), known.last, bool(gone)
         for found in matched:
@@ -214,7 +218,7 @@ class Works:
             if not task_id:
                 last, changed = last + 1, True
                 task_id = piece_id(known.id, last)
-                self._tasks.add(replace(found.task, id=task_id), stamp)
+                self._tasks.add_new(replace(found.task, id=task_id), stamp)
             elif renew and not found.flown:
                 changed |= self._renew(present[task_id], found.task, stamp)
             kept.append(task_id)
