@@ -23,6 +23,7 @@ from pathlib import Path
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import serialize_message
+from rclpy.signals import SignalHandlerOptions
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.model import Task
@@ -73,8 +74,10 @@ class TimedAllocator(AllocatorNode):
 
 
 def publish_states() -> None:
-    """200 UAVs that publish their states 5 times a second, until SIGTERM."""
-    rclpy.init()
+    """200 UAVs that publish their states 5 times a second, until a signal ends the process."""
+    # rclpy would end its context amid a publication, which raises
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     node = rclpy.create_node('uavs')
     publisher = node.create_publisher(m.UavState, 'uav_states', STATES)
     rng, sent, began = random.Random(1), 0, time.monotonic()
@@ -193,6 +196,7 @@ def main() -> int:
             figures = measure(Watch(), args.tasks, args.size)
         finally:
             uavs.terminate()
+            uavs.wait(30)
             node.send_signal(signal.SIGTERM)
             status = node.wait(30)
         figures |= {'status': status, **from_node(Path(os.environ['FLOOD_OUT']))}
