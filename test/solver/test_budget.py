@@ -2,6 +2,7 @@
 """Path searches around many zones keep the budget; legs without a known path are not flown."""
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -119,6 +120,33 @@ def test_a_plan_keeps_its_tasks_where_the_budget_is_used_up_before_the_search(
     after = plan(uavs, tasks, [zone], budget=0.1, warm=before, max_iterations=0,
                  clock=lambda: next(late), **options)
     assert after.unassigned == {}
+
+
+@pytest.mark.parametrize('objective', ['distance', 'finish'])
+@pytest.mark.parametrize('gone', [(), (0,), (3,), (7,), (2, 5)], ids=str)
+def test_ways_home_around_zones_are_kept_where_no_path_is_found_in_time(objective, gone):
+    """Lengths known from before are none here, as in a problem with thousands of tasks."""
+    wall = ThreatZone.polygon('wall', ((-50.0, -300.0), (-40.0, -300.0), (-40.0, 300.0),
+                                       (-50.0, 300.0)))
+    zones = [wall, *(ThreatZone.cylinder(f'post {y}', (-45.0, y), 30.0) for y in (-300.0, 300.0)),
+             ThreatZone.cylinder('post', (330.0, 0.0), 25.0)]
+    uav = Uav('u', (20.0, 0.0, 50.0), home=(-200.0, 0.0, 50.0))
+    tasks = [Task(f't{k}', (80.0 * k, 40.0 * (-1) ** k, 50.0)) for k in range(8)]
+    options = {'objective': objective, 'route_end': 'home'}
+    before = plan([uav], tasks, zones, budget=1e3, max_iterations=200, **options)
+    assert not before.unassigned
+    assert before.legs['u'][-1].via
+    left = [task for task in tasks if before.routes['u'].index(task.id) not in gone]
+    late = (5.0 * max(0, k - 1) for k in itertools.count())
+    after = plan([uav], left, zones, budget=0.1, warm=replace(before, state=None),
+                 max_iterations=0, clock=lambda: next(late), **options)
+    assert after.unassigned == {}
+    places = {task.id: task.position for task in tasks}
+    line = [uav.position]
+    stops = [*(places[name] for name in after.routes['u']), uav.home]
+    for leg, stop in zip(after.legs['u'], stops, strict=True):
+        line += [*leg.via, stop]
+    assert path_is_clear(line, zones)
 
 
 def test_finding_20_an_exception_of_stop_is_raised_by_plan():

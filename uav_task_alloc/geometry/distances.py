@@ -160,7 +160,7 @@ class Distances:
             return False
         path = np.empty((MAX_CORNERS, 3))
         for first in range(len(via) + 1 if len(via) < MAX_CORNERS - 1 else 0):
-            rest = [self._point(i), *via[first:], self._point(j)]
+            rest = [self.point(i), *via[first:], self.point(j)]
             path[:len(rest)] = rest
             if take_path(self.pairs, i, j, path, len(rest)):
                 return True
@@ -185,20 +185,33 @@ class Distances:
         if scene.location[j] == INSIDE:
             return Leg((), math.inf)
         known = known_length(self.pairs, i, j)
-        if known >= 0.0:
-            path = np.empty((MAX_CORNERS, 3))
-            n = stored_path(scene, i, j, path)
-            points = as_points(path[:n])
-            if n and abs(polyline_length(points) - known) < 1e-6:
-                return Leg(points[1:-1], known)
+        stored = self.stored_leg(i, j)
+        if stored is not None:
+            return stored
         metres, points = path_between(
-            self._obstacles, self._point(i), self._point(j), scene.limits,
+            self._obstacles, self.point(i), self.point(j), scene.limits,
             None if known >= 0.0 else self.budget)
         return Leg(points, math.inf if math.isnan(metres) else metres)
 
+    def stored_leg(self, i: int, j: int) -> Leg | None:
+        """The path from i to j, where its length is known; never searches.
+
+        Returns:
+            None where it is not stored, or not any more.
+        """
+        known = known_length(self.pairs, i, j)
+        if not known >= 0.0:
+            return None
+        path = np.empty((MAX_CORNERS, 3))
+        n = stored_path(self._scene, i, j, path)
+        points = as_points(path[:n])
+        is_it = n and abs(polyline_length(points) - known) < 1e-6
+        return Leg(points[1:-1], known) if is_it else None
+
     def given_up(self, i: int, j: int) -> bool:
         """Whether the path from i to j was not found in the time; there may be one."""
-        return bool(np.isnan(self.known_lengths([i], [j])[0]))
+        return bool(self.zones) and not known_length(self.pairs, i, j) >= 0.0 and (
+            bool(self._scene.location[j] != INSIDE) and i != j)
 
     def known_lengths(self, origins: ArrayLike, goals: ArrayLike) -> Floats:
         """Lengths of paths without a search for them.
@@ -228,8 +241,9 @@ class Distances:
         if not self.zones:  # the kernel is not loaded
             return ()
         return tuple(self.zones[k].id
-                     for k in containing_zones(self._obstacles.rows, *self._point(i)))
+                     for k in containing_zones(self._obstacles.rows, *self.point(i)))
 
-    def _point(self, i: int) -> Point:
+    def point(self, i: int) -> Point:
+        """Return point i [m]."""
         x, y, z = self.points[i]
         return float(x), float(y), float(z)
