@@ -12,6 +12,7 @@ from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.geometry.zones import inside, path_is_clear
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.reasons import reasons
 from uav_task_alloc.solver.routes import empty_routes, insert, remove
 
 IN_TIME = 'found in the time'
@@ -147,6 +148,18 @@ def test_ways_home_around_zones_are_kept_where_no_path_is_found_in_time(objectiv
     for leg, stop in zip(after.legs['u'], stops, strict=True):
         line += [*leg.via, stop]
     assert path_is_clear(line, zones)
+
+
+@pytest.mark.parametrize(('reach', 'text'), [
+    (math.inf, 'no safe path past the zones found in the time; searched for again with the next '
+               'plan'),
+    (9e4, 'left out: the ranges do not suffice for all tasks')])
+def test_a_task_that_is_left_out_without_a_limit_of_range_is_not_out_of_range(reach, text):
+    """It can be reached: no path to it from a task, or from it to one, was found."""
+    tasks = [Task('west', (300.0, 0.0, 50.0)), Task('east', (700.0, 0.0, 50.0))]
+    problem = make_problem([Uav('u', (500.0, 900.0, 50.0), reach)], tasks, {}, Limits((WALL,)),
+                           Rules())
+    assert reasons(problem, np.array([1])) == {'east': text}
 
 
 def test_finding_20_an_exception_of_stop_is_raised_by_plan():

@@ -9,7 +9,7 @@ import numpy as np
 from uav_task_alloc.model import Task
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import Floats, Ints
-from uav_task_alloc.solver.way_reasons import WayReasons
+from uav_task_alloc.solver.way_reasons import NOT_IN_TIME, WayReasons
 
 
 def reasons(problem: Problem, unassigned: Ints) -> dict[str, str]:
@@ -62,6 +62,8 @@ def _reason(problem: Problem, ways: WayReasons, i: int, short: Floats) -> str:
     if need > a.range_left[nearest]:
         return (f'beyond the range of every UAV: {problem.uavs[nearest].id} needs '
                 f'{need:.0f} m and has {max(0.0, a.range_left[nearest]):.0f} m left')
+    if problem.distances.zones and a.range_left[nearest] == math.inf:
+        return NOT_IN_TIME  # of a path from or to a task of its list
     return 'left out: the ranges do not suffice for all tasks'
 
 

@@ -11,6 +11,9 @@ from uav_task_alloc.kernel import allocating_kernel
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import Floats, Ints
 
+NOT_IN_TIME = ('no safe path past the zones found in the time; searched for again with the next '
+               'plan')
+
 
 @allocating_kernel
 def _least_shortage(pairs: Pairs, uavs: Ints, short: Floats, range_left: Floats, home: int,
@@ -86,8 +89,7 @@ class WayReasons:
             A text for users.
         """
         if self._given_up(i):
-            return ('no safe path past the zones found in the time; searched for again with the '
-                    'next plan')
+            return NOT_IN_TIME
         everyone = self._problem.arrays.compatible[:, i].all()
         return self._no_path_home(i) or 'unreachable: no safe path past the zones' + (
             '' if everyone else ' for the UAVs that may serve it')
