@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
+from math import inf, isinf
 
 from uav_task_alloc.allocator.battery_watch import BatteryWatch
 from uav_task_alloc.allocator.giving_way import GivingWay
@@ -50,7 +51,7 @@ class Allocator:
     """The allocator without I/O.
 
     Apply inputs to `world`, call `tick` often, solve what `due` returns, `adopt` the answer, and
-    publish what `collect` returns.
+    publish what `collect` returns, before the next `tick`.
 
     Args:
         params: of the node.
@@ -112,8 +113,10 @@ class Allocator:
         self.batteries.tick(now, stamp)
         self._end_orders(stamp)
         self._changes.end(now, stamp)
+        if isinf(self._hold_until):  # the lists of the previous run are published by now
+            self._hold_until = now + _RESTART_HOLD
         if self._restarted:  # the plan of the previous run is published before any other
-            self._restarted, self._hold_until = False, now + _RESTART_HOLD
+            self._restarted, self._hold_until = False, inf
             world.publish(self._list_updates.of_previous_run(stamp), stamp, resend=True)
             self._publisher.allocate(Plan({}), 'restart', stamp)
         world.publish(self._list_updates.shortened(stamp), stamp)
@@ -180,7 +183,7 @@ class Allocator:
     def _check_hold(self, now: float) -> None:
         """End the hold after a restart when all awaited UAVs have reported for a while."""
         if self.world.restart_hold and self.awaited(now):
-            self._hold_until = now + _RESTART_HOLD
+            self._hold_until = max(self._hold_until, now + _RESTART_HOLD)
         elif self.world.restart_hold and now >= self._hold_until:
             self.world.release_hold(now)
 

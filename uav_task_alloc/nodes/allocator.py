@@ -198,8 +198,9 @@ class AllocatorNode(Node):
         due = self.pacing.is_due(now)
         if not self.leads() or not due or self.waits_for_subscribers(now):
             return
-        self.world.set_params(self.live.now, now)
-        self.core.tick(now, stamp)
+        if not self.pending:  # each step would look at all tasks again, and nothing be published
+            self.world.set_params(self.live.now, now)
+            self.core.tick(now, stamp)
         self.start_solve(now, stamp)
         self.publish(stamp)
         self.pacing.pause_after(now, time.monotonic())

@@ -132,6 +132,18 @@ def test_a_uav_that_reports_after_the_hold_is_not_compared(rows):
     assert driver.state(first) == 'ASSIGNED'
 
 
+def test_the_hold_after_a_restart_counts_from_when_the_lists_are_published(rows):
+    driver = AllocatorDriver(restored_state(rows))
+    for uav_id in ('a', 'b'):
+        driver.uav(uav_id, 0.0, 0.0, 50.0)
+    driver.core.tick(driver.now, driver.now)
+    driver.take()
+    published = driver.now + 8.0  # many lists: the next tick comes when all are
+    for wait, holds in ((0.0, True), (2.9, True), (3.1, False)):
+        driver.core.tick(published + wait, published + wait)
+        assert driver.world.restart_hold is holds
+
+
 def test_an_unreadable_row_is_left_out_and_named(rows):
     found = restored_state([
         *rows, JournalRow('task', 't9', {'id': 't9'}), JournalRow('mood', '', 'good'),
