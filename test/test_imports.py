@@ -39,6 +39,7 @@ LEVELS = {
     'parameter_texts': 2,
     'journal': 1,
     'journal_recovery': 2,
+    'key_ranges': 0,
     'kernel_arguments': 0,
     'kernel_cache': 1,
     'kernel': 1,

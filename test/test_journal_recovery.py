@@ -85,6 +85,21 @@ def test_finding_23_the_rows_on_both_sides_of_a_corrupt_page_are_recovered(tmp_p
     assert 200 <= len(recovered) < 300
 
 
+def test_the_rows_between_corrupt_pages_are_recovered(tmp_path):
+    journal = Journal(str(tmp_path))
+    journal.put([JournalRow('task', f't{k}', 'x' * 700) for k in range(2000)])
+    journal.close()
+    file = tmp_path / FILE_NAME
+    held = bytearray(file.read_bytes())
+    leaves = [page for page in range(2, len(held) // 4096) if held[page * 4096] == 10]
+    for page in leaves[2:-2:40]:
+        held[page * 4096:(page + 1) * 4096] = bytes(4096)
+    file.write_bytes(held)
+    recovered = recover_rows(set_aside(str(tmp_path)))
+    assert {row.body for row in recovered} == {'x' * 700}
+    assert 1800 <= len({row.id for row in recovered}) == len(recovered) < 2000
+
+
 def test_a_damage_that_sqlite_quotes_in_its_error_is_a_damage(tmp_path):
     journal = Journal(tmp_path)
     journal.put([JournalRow('a', '1', 1)])

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+from collections import deque
 from collections.abc import Iterable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from uav_task_alloc.atomic_files import sync_folder
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
+from uav_task_alloc.key_ranges import ALL_KEYS, KeyRange, RowKey, after
 
 FILE_NAME = 'journal.sqlite3'
 VERSION = 1  # of the table layout; a file with a newer one is refused
@@ -28,6 +29,7 @@ _TEXTS = {'database is locked': _BUSY, 'database table is locked': _LOCKED,
 # a text of SQLite that quotes a corrupt file may be no UTF-8
 _FAILURES = (sqlite3.Error, OSError, UnicodeDecodeError)
 _SELECT = 'SELECT kind, id, body FROM world'
+_MOST_GAPS = 10_000  # of a corrupt file that are looked into: a second
 
 
 class JournalRow(NamedTuple):
@@ -228,22 +230,43 @@ def _body(text: Any) -> Any:
 
 
 def readable_rows(path: Path) -> list[JournalRow]:
-    """Read a corrupt file from both ends up to the first error.
+    """Read what is readable of a corrupt file: around each error, from both sides.
 
     Args:
         path: the file; SQLite may write to it.
 
     Returns:
-        Each readable row once.
+        Each readable row once; where very much is corrupt, not all of them.
     """
-    found: dict[tuple[str, str], JournalRow] = {}
+    found: dict[RowKey, JournalRow] = {}
     db = _connect(path)
     try:
-        for order in ('ASC', 'DESC'):
-            with suppress(*_FAILURES):
-                for each in db.execute(f'{_SELECT} ORDER BY kind {order}, id {order}'):
-                    row = _row(*each)
-                    found.setdefault((row.kind, row.id), row)
+        unread = deque(_read_towards(db, ALL_KEYS, 'ASC', found))
+        unread = deque(each for gap in unread for each in _read_towards(db, gap, 'DESC', found))
+        for _ in range(_MOST_GAPS):
+            if not unread:
+                break
+            gap = unread.popleft()
+            middle = gap.middle()
+            if middle is not None:
+                unread += _read_towards(db, KeyRange(gap.low, middle), 'DESC', found)
+                unread += _read_towards(db, KeyRange(middle, gap.high), 'ASC', found)
     finally:
         db.close()
     return list(found.values())
+
+
+def _read_towards(db: Any, keys: KeyRange, order: str,
+                  found: dict[RowKey, JournalRow]) -> list[KeyRange]:
+    """Read a range from one end up to the first error; returns the rest, if any."""
+    low, high = keys
+    try:
+        for each in db.execute(f'{_SELECT} WHERE (kind, id) >= (?, ?) AND (kind, id) < (?, ?) '
+                               f'ORDER BY kind {order}, id {order}', (*low, *high)):
+            row = _row(*each)
+            key = row.kind, row.id
+            found.setdefault(key, row)
+            low, high = (after(key), high) if order == 'ASC' else (low, key)
+    except _FAILURES:
+        return [KeyRange(low, high)]
+    return []

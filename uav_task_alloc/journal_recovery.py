@@ -67,7 +67,7 @@ def read_copy(state_dir: str) -> list[JournalRow]:
 
 
 def recover_rows(path: Path) -> list[JournalRow]:
-    """Read what is readable of a corrupt file, from both ends up to the first error.
+    """Read what is readable of a corrupt file: around each error, from both sides.
 
     Args:
         path: the file, which is not changed.
