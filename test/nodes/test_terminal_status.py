@@ -2,9 +2,12 @@
 """What live_view prints must not stop what it receives."""
 import contextlib
 import os
+import signal
+import subprocess
 from threading import Thread
 
 import pytest
+from ament_index_python.packages import get_package_prefix
 
 from uav_task_alloc.nodes.ros import terminal_status
 from uav_task_alloc.record import run_state
@@ -36,3 +39,19 @@ def test_a_pipe_that_nobody_reads_does_not_stop_the_node(monkeypatch):
     assert not hangs
     assert b'0 of 0 tasks' in os.read(end, 1 << 20)
     os.close(end)
+
+
+def test_an_output_on_a_full_disk_does_not_end_the_node(domain):
+    program = os.path.join(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc/live_view')
+    with open('/dev/full', 'w') as out:
+        view = subprocess.Popen([program, '--ros-args', '-p', 'port:=0'], stdout=out,
+                                stderr=subprocess.PIPE, text=True)
+    try:
+        assert 'terminal: OSError: [Errno 28] No space left on device: ignored' in (
+            view.stderr.readline())
+        view.send_signal(signal.SIGINT)
+        assert view.wait(60) == 0
+    finally:
+        view.kill()
+        view.wait()
+        view.stderr.close()

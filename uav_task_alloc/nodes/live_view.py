@@ -245,7 +245,7 @@ class LiveView(Node):
             self.get_logger().warning(f'no live page: {reason}')
             return None
         server.start()
-        print(f'Live page: {server.address}', flush=True)
+        self.guard.handle('terminal', lambda: print(f'Live page: {server.address}', flush=True))
         return server
 
     def _start_recorder(self) -> BagRecorder | None:
