@@ -1,8 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated time that is missing, stands still, jumps or goes back: one line each."""
+from types import SimpleNamespace
+
 import pytest
 
-from uav_task_alloc.nodes.ros.clock_watch import ClockOffsets, ClockWatch, SteadyTime
+from uav_task_alloc.nodes.ros import clock_watch
+from uav_task_alloc.nodes.ros.clock_watch import (
+    ClockOffsets,
+    ClockWatch,
+    SteadyTime,
+    watch_clock,
+)
 
 
 def lines(*readings):
@@ -92,3 +100,22 @@ def test_what_has_no_time_has_no_offset(stamp, clock):
     for k in range(9):
         offsets.add('uav_1', stamp, clock, k)
     assert offsets.warning(9.0) == ''
+
+
+@pytest.mark.parametrize(('namespaces', 'end'), [
+    (('/north',), ''),
+    (('/south', '/'), '; it is published by /fleet_sim, /south/fleet_sim: expected one node')])
+def test_a_jump_names_the_nodes_that_publish_the_clock_where_they_are_several(
+        monkeypatch, namespaces, end):
+    monkeypatch.setattr(clock_watch, 'steady_clock', lambda: None)
+    times, logged, timers = [900_000_000_000, 100_000_000_000], [], []
+    watch_clock(SimpleNamespace(
+        get_parameter=lambda _: SimpleNamespace(value=True),
+        get_clock=lambda: SimpleNamespace(
+            now=lambda: SimpleNamespace(nanoseconds=times.pop(0))),
+        get_publishers_info_by_topic=lambda _: [
+            SimpleNamespace(node_name='fleet_sim', node_namespace=each) for each in namespaces],
+        create_timer=lambda _, callback, clock: timers.append(callback)), logged.append)
+    timers[0]()
+    timers[0]()
+    assert logged == [f'/clock went back by 800.0 s, to 100.0 s{end}']

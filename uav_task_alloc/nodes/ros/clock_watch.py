@@ -156,6 +156,13 @@ def steady_clock() -> Clock:
     return Clock(clock_type=ClockType.STEADY_TIME)
 
 
+def _several_publishers(node: Node) -> str:
+    """The end of a line: which nodes publish /clock, where they are several."""
+    names = sorted(f'{each.node_namespace.rstrip("/")}/{each.node_name}'
+                   for each in node.get_publishers_info_by_topic('/clock'))
+    return f'; it is published by {", ".join(names)}: expected one node' if names[1:] else ''
+
+
 def watch_clock(node: Node, warn: Callable[[str], object]) -> ClockWatch:
     """Log troubles of simulated time while the node lives by it.
 
@@ -174,7 +181,7 @@ def watch_clock(node: Node, warn: Callable[[str], object]) -> ClockWatch:
             return
         text = watch.update(ros_time(node), time.monotonic())
         if text:
-            warn(text)
+            warn(text + _several_publishers(node))
 
     node.create_timer(_PERIOD, on_timer, clock=steady_clock())
     return watch
