@@ -267,6 +267,11 @@ def test_a_task_that_a_restarted_allocator_does_not_know_says_so_until_it_is_ann
     assert run.statuses.known()['a'].state == 'ACTIVE'
 
 
+def test_tasks_whose_announcement_was_not_received_count():
+    run = run_state(announced('ADD', 'a'), status(('t1', 'COMPLETED'), ('t2', 'PENDING')))
+    assert headline(run, 9.0).startswith('    9 s  1 of 3 tasks completed, 1 pending;')
+
+
 def test_a_run_is_not_over_before_the_last_event_of_its_scenario():
     assert not run_is_over(run_state(*DONE), TWO, clock=7.0)
     assert not run_is_over(run_state(announced('ADD', 'a'), *DONE[1:]), TWO, clock=9.0)

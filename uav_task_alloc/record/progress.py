@@ -28,7 +28,8 @@ def headline(run: RunState, clock: float) -> str:
         if run.statuses.count(state))
     zones = len(run.zones_now())
     completed = run.statuses.count('COMPLETED')
-    text = (f'{clock:5.0f} s  {completed} of {len(run.tasks)} tasks completed{counts}; '
+    known = len(run.tasks.keys() | run.statuses.known().keys())  # some only to the allocator
+    text = (f'{clock:5.0f} s  {completed} of {known} tasks completed{counts}; '
             f'{counted(zones, "zone")}')
     if run.solves:
         replans = run.replans()
