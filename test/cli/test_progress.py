@@ -46,6 +46,16 @@ def test_then_the_best_fit_and_the_time_left_are_shown_and_erased_at_the_end():
         f'Ctrl-C stops and keeps it{WIPE}')
 
 
+def test_a_better_plan_of_a_worse_fit_is_shown_as_the_best():
+    now = [100.0]
+    stream = Terminal()
+    with SolveProgress(10.0, stream, lambda: now[0]) as progress:
+        for now[0], fit in ((100.0, 60.5), (103.0, 70.5), (104.1, 70.5)):
+            progress.on_iteration(100, fit)
+            progress.stop()
+    assert 'fit 70.5, improved 1 s ago' in stream.getvalue()
+
+
 def test_the_line_is_updated_at_most_five_times_a_second():
     shown = run(Terminal(), [0.0, *(2.0 + 0.01 * i for i in range(100))])
     assert shown.count('solving') == 5

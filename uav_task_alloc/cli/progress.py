@@ -53,7 +53,7 @@ class SolveProgress:
 
     def on_iteration(self, iterations: int, fit: float) -> None:
         """Record the fit of the best plan after so many iterations."""
-        if self._best is None or fit < self._best[0]:
+        if self._best is None or fit != self._best[0]:  # of a better plan it may be worse
             self._best = fit, self._clock()
 
     def stop(self) -> bool:

@@ -47,7 +47,8 @@ class Plan:
         value: R of eq 2.12.
         penalty: [m] beyond range, P of eq 2.12.
         fit: of eq 2.12, smaller is better.
-        history: ([s], fit) of the incumbent.
+        history: ([s], fit) of the incumbent; the objective decides which is better, so the fit may
+            rise.
         state: for the next warm start; opaque.
         legs: by UAV id, as in Route.
         returns: routes end at home.

@@ -80,7 +80,8 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
             those that are in `warm`.
         stop: polled between iterations; True ends the solve with the best plan so far.
         max_iterations: ends the solve as well; None: no limit. Each solver defines its iteration.
-        on_iteration: called with (iterations so far, best fit) after each or a few iterations.
+        on_iteration: called with (iterations so far, fit of the best) after each or a few
+            iterations.
         clock: [s], monotonic.
 
     Returns:

@@ -116,7 +116,7 @@ def test_the_search_goes_on_from_a_better_combination():
     colony = TimedColony(problem, first_plan(problem, WarmState()), 0, SELECTION)
     a, worse = colony.arrays, set_routes(problem, {'a': good[0]})
     route_order(a, worse, colony.best.order)
-    colony.best.score[:] = cost(problem, worse), worse.sums[at.SERVED_WORTH]
+    colony.best.score[:2] = cost(problem, worse), worse.sums[at.SERVED_WORTH]
     for row in good:
         collect_routes(a, set_routes(problem, {'b': row}), colony._pool)
     colony._flown = 10_000  # rounds, by which the work is limited

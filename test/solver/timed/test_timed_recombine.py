@@ -140,7 +140,7 @@ def test_the_search_goes_on_from_what_was_recombined():
     a, best, routes = problem.arrays, empty_incumbent(problem.arrays), None
     worst = max(seen, key=lambda each: cost(problem, each))
     route_order(a, worst, best.order)
-    best.score[:] = cost(problem, worst), worst.sums[at.SERVED_WORTH]
+    best.score[:2] = cost(problem, worst), worst.sums[at.SERVED_WORTH]
     for each in seen:
         collect_timed(a, each, intensifier._pool)
     routes = empty_timed_routes(a)

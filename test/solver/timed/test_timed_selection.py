@@ -75,7 +75,7 @@ def test_leaving_a_task_out_costs_much_more_than_serving_tasks_in_clusters():
     values = np.array([task.value for task in work])
     colony.fly(0.0, 0.2, 200)
     assert colony.arrays.unserved == pytest.approx(before)
-    cost, worth = colony.best.score.copy()
+    cost, worth, *_ = colony.best.score.copy()
     colony.fly(0.85, 0.9, 0)
     most = np.maximum(before, 10.0 * cost / worth * values)
     assert most.max() > 1.5 * before.max()

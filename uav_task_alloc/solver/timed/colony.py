@@ -157,7 +157,7 @@ class TimedColony:
         clusters: routes that serve less value could cost less than those that serve more, and the
         temperatures, which follow those legs too, are low. Both rise by the same factor.
         """
-        a, (cost, worth) = self.arrays, self.best.score.tolist()
+        a, (cost, worth, *_) = self.arrays, self.best.score.tolist()
         some = a.unserved > 0.0
         if self._params.least_price > 0.0 and worth > 0.0 and some.any():
             rows, before = a.fixed[a.uavs:a.ends], a.unserved[some].sum()

@@ -32,21 +32,23 @@ MAX_OPENING = 64  # absent tasks that a round tries to insert that opens a route
 OPENING_RATE = 0.1  # share of rounds with absent tasks that open a route around one of them
 GENEROUS_RATE = 0.5  # share of rounds in which a task may cost more than its price
 FEW_ABSENT = 0.05  # up to this share of absent tasks their price rises
-BEST_COST, BEST_WORTH = range(2)  # entries of Incumbent.score
+BEST_COST, BEST_WORTH, BEST_METRES, BEST_EXCESS = range(4)  # entries of Incumbent.score
 
 
 class Incumbent(NamedTuple):
     """The best routes so far."""
 
     order: Links  # (nodes) node after each node; itself: in no route; as `route_order` writes it
-    score: Floats  # (2) cost without unserved tasks or, where those have a price, with; value
+    # (4) cost without unserved tasks or, where those have a price, with; value; metres; of those
+    # beyond ranges, and beyond endurances at cruise speed
+    score: Floats
 
 
 def empty_incumbent(a: TimedArrays) -> Incumbent:
     """An incumbent without routes, which any is better than."""
     order = np.arange(node_count(a))
     order[:a.uavs] += a.ends
-    return Incumbent(order.astype(LINK), np.array([math.inf, -math.inf]))
+    return Incumbent(order.astype(LINK), np.array([math.inf, -math.inf, 0.0, 0.0]))
 
 
 def copy_incumbent(best: Incumbent) -> Incumbent:
@@ -99,6 +101,8 @@ def record(a: TimedArrays, r: TimedRoutes, best: Incumbent, prizes: bool) -> boo
     if not is_improvement(cost, r.sums[at.SERVED_WORTH], best.score, prizes):
         return False
     best.score[BEST_COST], best.score[BEST_WORTH] = cost, r.sums[at.SERVED_WORTH]
+    best.score[BEST_METRES] = r.sums[at.METRES]
+    best.score[BEST_EXCESS] = r.sums[at.RANGE_EXCESS] + r.sums[at.ENDURANCE_EXCESS]
     route_order(a, r, best.order)
     return True
 
