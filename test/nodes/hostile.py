@@ -49,7 +49,8 @@ announcement = st.builds(m.TaskAnnouncement, header=header, action=byte,
 state = st.builds(
     m.UavState, header=header, uav_id=word, position=point, home=point, battery=narrow,
     range_remaining=narrow, cruise_speed=narrow, capabilities=some(word), available=st.booleans(),
-    mode=byte, mission_state=byte, active_task_id=word, list_revision=st.integers(0, 3) | count)
+    mode=byte, mission_state=byte, authority=byte, active_task_id=word,
+    list_revision=st.integers(0, 3) | count)
 event = st.builds(m.TaskEvent, header=header, task_id=word, uav_id=word,
                   revision=st.integers(0, 3) | count, event=byte, reason=word)
 zone_array = st.builds(m.ThreatZoneArray, header=header, zones=some(zone))
@@ -85,6 +86,7 @@ spoiled = st.one_of(
     st.tuples(st.just('state'), st.just('cruise_speed'), st.sampled_from((-1.0, 3e38, 1e5))),
     st.tuples(st.just('state'), st.just('mode'), st.integers(8, 255)),
     st.tuples(st.just('state'), st.just('mission_state'), st.integers(5, 255)),
+    st.tuples(st.just('state'), st.just('authority'), st.integers(5, 255)),
     st.tuples(st.just('state'), st.just('active_task_id'), not_a_name.filter(bool)),
     st.tuples(st.just('state'), st.just('list_revision'), st.integers(2**31 + 1, 2**32 - 1)),
     st.tuples(st.just('state'), st.just('capabilities'), st.just(['']) | many),

@@ -107,6 +107,7 @@ def test_a_bad_task_is_refused_by_the_name_of_its_field(changed, text):
     ({'battery': -1.0}, 'uav u1: battery = -1.0'),
     ({'mode': 99}, 'uav u1: mode = 99'),
     ({'mission_state': 77}, 'uav u1: mission_state = 77'),
+    ({'authority': 99}, 'uav u1: authority = 99'),
     ({'range_remaining': -5.0}, 'uav u1: range'),
     ({'cruise_speed': -5.0}, 'uav u1: cruise_speed'),
     ({'endurance': -5.0}, 'uav u1: endurance = -5.0'),

@@ -174,9 +174,9 @@ def to_report(msg: m.UavState) -> UavReport:
     """
     check_ros_name('uav_id', msg.uav_id)
     place = f'uav {msg.uav_id}: '
-    check_number(place + 'mode', msg.mode, m.UavState.UNKNOWN, m.UavState.FAULT)
-    check_number(place + 'mission_state', msg.mission_state, m.UavState.UNKNOWN,
-                 m.UavState.FOREIGN)
+    for name, last in (('mode', m.UavState.FAULT), ('mission_state', m.UavState.FOREIGN),
+                       ('authority', m.UavState.LOST)):
+        check_number(place + name, getattr(msg, name), m.UavState.UNKNOWN, last)
     if msg.active_task_id:
         check_ros_name(place + 'active_task_id', msg.active_task_id)
     check_number(place + 'list_revision', msg.list_revision, 0, _MOST_REVISIONS)
