@@ -12,6 +12,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polygon import is_simple, signed_area
 
 _Names = TypeVar('_Names', bound=Enum)
+_Type = TypeVar('_Type')
 FAR = 1e8  # [m] bound of all coordinates
 _ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*')
 
@@ -89,6 +90,30 @@ def check_member(place: str, value: int, names: type[_Names]) -> _Names:
     except ValueError:
         *most, last = (f'{each.name} ({each.value})' for each in names)
         raise InvalidValue(place, value, f'{", ".join(most)} or {last}') from None
+
+
+def check_instances(place: str, values: Iterable[_Type], expected: type[_Type]
+                    ) -> tuple[_Type, ...]:
+    """Check that values can be listed, and that each is of a type.
+
+    Args:
+        place: name of the values in the error text.
+        values: the values.
+        expected: their type.
+
+    Returns:
+        The same in a tuple.
+
+    Raises:
+        InvalidValue: there is no list of them, or one is of another type.
+    """
+    if not isinstance(values, Iterable):
+        raise InvalidValue(place, values, f'an iterable of {expected.__name__}')
+    checked = tuple(values)
+    for each in checked:
+        if not isinstance(each, expected):
+            raise InvalidValue(place, each, f'a {expected.__name__}')
+    return checked
 
 
 def check_count(place: str, many: Sized, most: int) -> None:

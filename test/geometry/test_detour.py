@@ -221,6 +221,8 @@ def test_an_end_that_touches_a_zone_is_outside_it():
     (lambda: detour((0, 0, 0), (1, 0, 0), clearance=-1.0), r'clearance = -1.0: expected'),
     (lambda: detour((0, 0, 0), (1, 0, 0), altitude_min=5, altitude_max=4),
      'expected altitude_min <= altitude_max'),
+    (lambda: detour((0, 0, 0), (1, 0, 0), 3), 'zones = 3: expected an iterable of ThreatZone'),
+    (lambda: detour((0, 0, 0), (1, 0, 0), ['z']), "zones = 'z': expected a ThreatZone"),
     (lambda: ThreatZone.hemisphere('z', (0, 0, 0), 0.0), 'zone z: radius = 0.0: expected'),
     (lambda: ThreatZone.polygon('z', [(0, 0), (1, 1)]), 'expected at least 3 corners'),
     (lambda: ThreatZone.polygon('z', [(0, 0), (1, 1), (1, 0), (0, 1)]),

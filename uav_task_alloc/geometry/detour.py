@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uav_task_alloc.checks import check_number, check_point
+from uav_task_alloc.checks import check_instances, check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.obstacles import Floats, Obstacles, containing_zones, pack
 from uav_task_alloc.geometry.scene import path_found
@@ -62,10 +62,11 @@ def detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] =
         (inf, ()) where there is no path.
 
     Raises:
-        InvalidValue: a point is not finite, the clearance is negative, or the limits are reversed.
+        InvalidValue: a point is not finite, something else is among the zones, the clearance is
+            negative, or the limits are reversed.
     """
-    found = find_detour(a, b, zones, clearance=clearance, altitude_min=altitude_min,
-                        altitude_max=altitude_max)
+    found = find_detour(a, b, check_instances('zones', zones, ThreatZone), clearance=clearance,
+                        altitude_min=altitude_min, altitude_max=altitude_max)
     return found.length, found.points
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral
 from typing import TypeVar
 
-from uav_task_alloc.checks import check_names, check_number
+from uav_task_alloc.checks import check_instances, check_names, check_number
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import MAX_TRIPS, Weights
@@ -20,13 +20,9 @@ MAX_BUDGET = 86_400.0  # [s]
 def check_unique(kind: str, values: Iterable[_Named],
                  expected: type[_Named]) -> tuple[_Named, ...]:
     """The objects as a tuple; raises InvalidValue for a wrong type or a repeated id."""
-    if not isinstance(values, Iterable):
-        raise InvalidValue(f'{kind}s', values, f'an iterable of {expected.__name__}')
-    checked = tuple(values)
+    checked = check_instances(f'{kind}s', values, expected)
     seen: set[str] = set()
     for each in checked:
-        if not isinstance(each, expected):
-            raise InvalidValue(f'{kind}s', each, f'a {expected.__name__}')
         if each.id in seen:
             raise InvalidValue(f'{kind} id', each.id, 'an id used once')
         seen.add(each.id)
