@@ -266,7 +266,8 @@ def main() -> int:
                     for key in ('extra', 'extra_other'))
     totals = {'scenes': len(rows), 'losses': sum(row['losses'] for row in rows),
               'losses_without': sum(row['losses_without'] for row in rows),
-              'separation_min_m': min(least for row in rows for least in row['least']),
+              'separation_min_m': min((least for row in rows for least in row['least']
+                                       if least < math.inf), default=math.nan),
               'extra_percent_median': round(statistics.median(extra), 2),
               'extra_percent_max': max(extra),
               'extra_percent_other_plans_median': round(statistics.median(other), 2),
