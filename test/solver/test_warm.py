@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Warm starts from an earlier plan."""
-from dataclasses import replace
+import copy
+import math
+import pickle
+from dataclasses import fields, replace
 
+import numpy as np
 import pytest
 from plan_checks import check, make
 
@@ -80,7 +84,8 @@ def test_a_plan_built_by_hand_is_a_warm_start():
 
 def test_learnt_values_are_reused_by_id():
     moved = [*TASKS[:0:-1], Task('new', (1.0, 1.0, 0.0))]
-    first = quick(UAVS, TASKS, max_iterations=20_000)
+    first = quick(UAVS, TASKS, max_iterations=60_000)
+    assert first.state.learnt is not None  # scouts have flown
     result = quick(UAVS, moved, warm=first)
     check(result, UAVS, moved)
 
@@ -111,3 +116,39 @@ def test_windows_may_come_and_go_between_plans(timed_last):
     for each in same:
         check(each, UAVS, then)
     assert same[0].routes == same[1].routes
+
+
+PICKLED = {
+    'distance': (UAVS, TASKS, {}),
+    'zone': (UAVS, TASKS, {'zones': [ThreatZone.cylinder('z', (500.0, 500.0), 120.0)]}),
+    'trips': ([Uav('u', (0.0, 0.0, 0.0), 3000.0, turnaround=60.0, full_range=3000.0)],
+              [Task(f't{k}', (400.0 * math.cos(k), 1200.0 * math.sin(k), 0.0)) for k in range(6)],
+              {'trips': 3, 'route_end': 'home', 'objective': 'finish'}),
+}
+
+
+@pytest.mark.parametrize('kind', PICKLED)
+def test_a_pickled_plan_has_its_times_and_is_a_warm_start(kind):
+    uavs, tasks, options = PICKLED[kind]
+    before = quick(uavs, tasks, **options)
+    after = pickle.loads(pickle.dumps(before))
+    assert {each.name: getattr(after, each.name) for each in fields(Plan)
+            if each.name not in ('state', 'timetable')} == {
+                each.name: getattr(before, each.name) for each in fields(Plan)
+                if each.name not in ('state', 'timetable')}
+    assert after.timetable() == before.timetable()
+    assert after.timetable().arrivals
+    again = quick(uavs, tasks, warm=after, max_iterations=0, **options)
+    assert (again.routes, again.trips) == (before.routes, before.trips)
+    assert kind != 'trips' or len(before.trips_of('u')) > 1
+    assert copy.deepcopy(before).timetable() == before.timetable()
+
+
+def test_what_was_learnt_is_pickled():
+    before = quick(UAVS, TASKS, max_iterations=60_000)
+    after = pickle.loads(pickle.dumps(before))
+    known, learnt = before.state.learnt, after.state.learnt
+    assert (learnt.uavs, learnt.tasks) == (known.uavs, known.tasks)
+    for one, other in zip(learnt.tables, known.tables, strict=True):
+        assert np.array_equal(one, other)
+    assert quick(UAVS, TASKS, warm=after).fit <= before.fit + 1e-9

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from typing import Any
 
 from uav_task_alloc.model.task import Point
@@ -49,7 +50,8 @@ class Plan:
         fit: of eq 2.12, smaller is better.
         history: ([s], fit) of the incumbent; the objective decides which is better, so the fit may
             rise.
-        state: for the next warm start; opaque.
+        state: for the next warm start; opaque. Of a plan that was pickled it has the routes and
+            what was learnt, not the paths around zones that are known.
         legs: by UAV id, as in Route.
         returns: routes end at home.
         solver: name of the solver.
@@ -83,6 +85,11 @@ class Plan:
     conflicts: tuple[Conflict, ...] = ()
     reversed: frozenset[str] = frozenset()
     path_lengths: Mapping[str, float] = field(default_factory=dict)  # [m]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How to pickle a plan: with its times, as what computes them cannot be pickled."""
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return partial(Plan, **(values | {'timetable': partial(replace, self.timetable())})), ()
 
     @property
     def arrivals(self) -> Mapping[str, float]:

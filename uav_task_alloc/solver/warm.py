@@ -38,6 +38,11 @@ class WarmState:
     reversed: frozenset[str] = frozenset()  # ids of tasks flown from their last points
     timed: Any = None  # the TimedProblem, whose neighbours are used again
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How to pickle a state: without the problems, which have pointers to kernels."""
+        return WarmState, (None, self.learnt, dict(self.routes), dict(self.legs),
+                           dict(self.trips), self.reversed)
+
     @classmethod
     def of(cls, warm: Plan | WarmState | None) -> WarmState:
         """Return the state of a plan, with its routes and legs.
