@@ -7,6 +7,16 @@ from uav_task_alloc.journal import FILE_NAME, Journal, JournalRow
 from uav_task_alloc.journal_recovery import read_copy, recover_rows, set_aside
 
 ROW = JournalRow('a', '1', 1)
+ROWS = [JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)]
+
+
+def filled(tmp_path, rows):
+    """The file of a journal with these rows, and its bytes."""
+    journal = Journal(str(tmp_path))
+    journal.put(rows)
+    journal.close()
+    file = tmp_path / FILE_NAME
+    return file, bytearray(file.read_bytes())
 
 
 def test_a_journal_that_another_process_has_open_is_read_from_a_copy(tmp_path):
@@ -57,11 +67,8 @@ def test_a_journal_that_is_gone_is_set_aside_without_an_error(tmp_path):
 
 @pytest.mark.parametrize('pages', [2, 4, 6])
 def test_finding_23_the_rows_before_a_truncation_are_recovered(tmp_path, pages):
-    journal = Journal(str(tmp_path))
-    journal.put([JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)])
-    journal.close()
-    file = tmp_path / FILE_NAME
-    file.write_bytes(file.read_bytes()[:4096 * pages])
+    file, whole = filled(tmp_path, ROWS)
+    file.write_bytes(whole[:4096 * pages])
     with pytest.raises(JournalCorrupt, match='malformed'):
         Journal(str(tmp_path))
     held = file.read_bytes()
@@ -73,11 +80,7 @@ def test_finding_23_the_rows_before_a_truncation_are_recovered(tmp_path, pages):
 
 
 def test_finding_23_the_rows_on_both_sides_of_a_corrupt_page_are_recovered(tmp_path):
-    journal = Journal(str(tmp_path))
-    journal.put([JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)])
-    journal.close()
-    file = tmp_path / FILE_NAME
-    held = bytearray(file.read_bytes())
+    file, held = filled(tmp_path, ROWS)
     held[4 * 4096:5 * 4096] = bytes(range(256)) * 16
     file.write_bytes(held)
     recovered = {row.id for row in recover_rows(set_aside(str(tmp_path)))}
@@ -86,11 +89,7 @@ def test_finding_23_the_rows_on_both_sides_of_a_corrupt_page_are_recovered(tmp_p
 
 
 def test_the_rows_between_corrupt_pages_are_recovered(tmp_path):
-    journal = Journal(str(tmp_path))
-    journal.put([JournalRow('task', f't{k}', 'x' * 700) for k in range(2000)])
-    journal.close()
-    file = tmp_path / FILE_NAME
-    held = bytearray(file.read_bytes())
+    file, held = filled(tmp_path, [JournalRow('task', f't{k}', 'x' * 700) for k in range(2000)])
     leaves = [page for page in range(2, len(held) // 4096) if held[page * 4096] == 10]
     for page in leaves[2:-2:40]:
         held[page * 4096:(page + 1) * 4096] = bytes(4096)
