@@ -114,6 +114,10 @@ class JournalCorrupt(JournalError):
     """The journal file is corrupt or not a journal."""
 
 
+class JournalUnreadable(JournalError):
+    """The journal is there, but cannot be read: what it holds would be forgotten."""
+
+
 class JournalForeign(JournalError):
     """The journal must not be changed: a newer version or another program wrote it."""
 

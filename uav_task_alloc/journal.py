@@ -58,6 +58,7 @@ class Journal:
         self.path = Path(state_dir).expanduser() / FILE_NAME
         self._db: Any = None
         try:
+            check_links(self.path)
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if not self.path.exists():
                 _create(self.path)
@@ -204,6 +205,22 @@ def _move_into_place(temporary: Path, path: Path) -> None:
     except OSError:  # a file system without hard links
         temporary.rename(path)
     sync_folder(path.parent)
+
+
+def check_links(path: Path) -> None:
+    """Refuse a path through a link to what is missing, as to a disk that is not mounted.
+
+    Args:
+        path: of a file, which may be missing.
+
+    Raises:
+        JournalError: names the link.
+        OSError: a folder may not be read.
+    """
+    for each in (path, *path.parents):
+        if each.is_symlink() and not each.exists():
+            raise JournalError(f'{path} cannot be opened: {each} is a link to '
+                               f'{os.readlink(each)}, which is missing')
 
 
 def _check_length(path: Path) -> None:

@@ -5,11 +5,18 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
-from uav_task_alloc.errors import JournalCorrupt, JournalError
-from uav_task_alloc.journal import FILE_NAME, Journal, JournalRow, readable_rows
+from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign
+from uav_task_alloc.journal import (
+    FILE_NAME,
+    Journal,
+    JournalRow,
+    check_links,
+    readable_rows,
+)
 
 _SUFFIXES = ('', '-wal', '-shm')  # of the files of SQLite
 _MAX_SIZE = 2**30  # [bytes] a corrupt header may declare any length
@@ -53,6 +60,8 @@ def read_copy(state_dir: str) -> list[JournalRow]:
         JournalError: it cannot be copied or read.
     """
     path = Path(state_dir).expanduser() / FILE_NAME
+    with suppress(OSError):  # of a folder that may not be read, which the copy names
+        check_links(path)
     if all(_is_missing(Path(f'{path}{suffix}')) for suffix in _SUFFIXES[:2]):
         return []
 
@@ -106,8 +115,8 @@ def _with_copy(path: Path, read: Callable[[str], list[JournalRow]]) -> list[Jour
             with tempfile.TemporaryDirectory(dir=parent) as folder:
                 _copy(path, folder)
                 return read(folder)
-        except JournalCorrupt:
-            raise
+        except (JournalCorrupt, JournalForeign) as error:
+            raise type(error)(str(error).replace(folder, str(path.parent))) from error
         except (OSError, JournalError) as error:
             first_error = first_error or error
     raise JournalError(f'{path} cannot be copied: {first_error}') from first_error
@@ -124,10 +133,7 @@ def _pad(path: Path) -> None:
 
 
 def _copy(path: Path, folder: str) -> None:
-    """Copy the files of a journal under its usual name. Raises JournalError."""
-    try:
-        for suffix in _SUFFIXES[:2]:
-            if Path(f'{path}{suffix}').exists():
-                shutil.copyfile(f'{path}{suffix}', Path(folder, FILE_NAME + suffix))
-    except OSError as error:
-        raise JournalError(f'{path} cannot be read: {error}') from error
+    """Copy the files of a journal under its usual name. Raises OSError."""
+    for suffix in _SUFFIXES[:2]:
+        if not _is_missing(Path(f'{path}{suffix}')):
+            shutil.copyfile(f'{path}{suffix}', Path(folder, FILE_NAME + suffix))

@@ -14,7 +14,7 @@ from allocation import AllocatorDriver
 from uav_task_alloc import journal
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import SavedState
-from uav_task_alloc.errors import OriginMismatch
+from uav_task_alloc.errors import JournalUnreadable, OriginMismatch
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, JournalRow
 
@@ -322,7 +322,8 @@ def test_a_journal_is_read_where_no_temporary_folder_can_be_created(disk, unopen
     disk.persistence.close()
     usual = tempfile.TemporaryDirectory
     monkeypatch.setattr(tempfile, 'TemporaryDirectory', no_temporary_folder)
-    assert 'No usable temporary' in Disk(disk.folder).persistence.error
+    with pytest.raises(JournalUnreadable, match='No usable temporary directory found: expected'):
+        Disk(disk.folder)
     monkeypatch.setattr(tempfile, 'TemporaryDirectory',
                         lambda dir=None: usual(dir=dir) if dir else no_temporary_folder())
     later = Disk(disk.folder)

@@ -3,11 +3,13 @@
 
 Without a disk the allocator runs on with a warning, and what it accepts meanwhile is written when
 the disk is back. A damaged file is renamed, and a new one begun with its readable rows; a file of
-a newer version, or of another process, is left unchanged; one of another origin ends the start.
+a newer version, or of another process, is left unchanged; one of another origin, or one that
+cannot be read, ends the start: the tasks in it would be forgotten.
 """
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Protocol
 
 from uav_task_alloc.allocator.persistence.restore import origin_row, restored_state
@@ -17,11 +19,12 @@ from uav_task_alloc.errors import (
     JournalError,
     JournalForeign,
     JournalInUse,
+    JournalUnreadable,
     OriginMismatch,
     counted,
 )
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.journal import WAIT, Journal, JournalRow
+from uav_task_alloc.journal import FILE_NAME, WAIT, Journal, JournalRow
 from uav_task_alloc.journal_recovery import read_copy, recover_rows, set_aside
 
 _RETRY = 1.0  # [s] between two attempts on a disk that failed
@@ -58,6 +61,7 @@ class Persistence:
 
     Raises:
         OriginMismatch: the journal is of another origin.
+        JournalUnreadable: it is there, but cannot be read.
     """
 
     def __init__(self, state_dir: str, log_error: Callable[[str], object],
@@ -84,7 +88,7 @@ class Persistence:
         return '; '.join(filter(None, (self._present_error, self._lost)))
 
     def _begin(self) -> SavedState:
-        """Open the journal, or read a copy of it."""
+        """Open the journal, or read a copy of it. Raises OriginMismatch, JournalUnreadable."""
         try:
             return self._checked(self._open())
         except OriginMismatch:
@@ -94,14 +98,25 @@ class Persistence:
             self.in_use = str(error) if isinstance(error, JournalInUse) else ''
             self._give_up(str(error))
         except JournalError as error:
-            self._set_error(f'{error}; tried again every {_RETRY:g} s')
-            try:
-                return self._checked(self._recovered or read_copy(self._dir))
-            except OriginMismatch:
-                raise
-            except JournalError as worse:
-                self._set_lost(str(worse))
+            return self._begin_from_copy(f'{error}; tried again every {_RETRY:g} s')
         return SavedState()
+
+    def _begin_from_copy(self, error: str) -> SavedState:
+        """Read a journal that cannot be opened in its place."""
+        rows: list[JournalRow] = []
+        try:
+            rows = self._recovered or read_copy(self._dir)
+        except JournalForeign as worse:
+            self._give_up(str(worse))
+            return SavedState()
+        except JournalCorrupt as worse:
+            self._set_lost(str(worse))
+        except JournalError as worse:
+            raise JournalUnreadable(f'{worse}: expected a journal that can be read, as the tasks '
+                                    'in it would be forgotten: make it readable, or set another '
+                                    'state_dir') from None
+        self._set_error(error)
+        return self._checked(rows)
 
     def _checked(self, rows: list[JournalRow]) -> SavedState:
         """The state of these rows. Raises OriginMismatch."""
@@ -129,14 +144,18 @@ class Persistence:
 
     def _replace_damaged(self, error: JournalCorrupt) -> list[JournalRow]:
         """Rename the damaged file, and begin a new one with its readable rows."""
-        aside = set_aside(self._dir)
         try:
-            rows = recover_rows(aside)
+            rows = recover_rows(Path(self._dir).expanduser() / FILE_NAME)
         except JournalError:
             rows = []
         self._recovered = rows
+        readable = f'{counted(len(rows), "row")} that can be read'
+        try:
+            aside = set_aside(self._dir)
+        except JournalError as worse:
+            raise JournalError(f'{error}; {worse}; it has {readable}') from worse
         self._set_lost(f'{error}; set aside as {aside.name}, a new one is kept with the '
-                       f'{counted(len(rows), "row")} that can be read')
+                       f'{readable}')
         self._journal = Journal(self._dir)
         self._journal.put(row for row in rows if not isinstance(row.body, bytes))
         return rows
