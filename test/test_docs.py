@@ -88,22 +88,31 @@ class Sandbox:
             words = ['bash', '-euo', 'pipefail', '-c', text]
             (self.start if block.mark == 'until' else self.run)(block, words)
 
+    def _popen(self, words, output):
+        """A process in a group of its own, which ends with this one."""
+        return subprocess.Popen([sys.executable, '-IS', ROOT / 'test/ends_with_parent.py', *words],
+                                cwd=self.folder, env=self.env, stdout=output,
+                                stderr=subprocess.STDOUT, text=True, start_new_session=True)
+
     def run(self, block, words):
         """Run to the end: the status must be 0 unless the mark is `fails`."""
-        done = subprocess.run(words, cwd=self.folder, env=self.env, stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, text=True, timeout=TIMEOUT, check=False)
+        with self._popen(words, subprocess.PIPE) as done:
+            try:
+                output, _ = done.communicate(timeout=TIMEOUT)
+            finally:
+                with suppress(ProcessLookupError):  # what the shell has left
+                    os.killpg(done.pid, signal.SIGKILL)
         if block.mark == 'fails':
-            assert done.returncode != 0, f'{block}: expected it to fail\n{done.stdout}'
-            assert block.what in done.stdout, f'{block}:\n{done.stdout}'
+            assert done.returncode != 0, f'{block}: expected it to fail\n{output}'
+            assert block.what in output, f'{block}:\n{output}'
         else:
-            assert done.returncode == 0, f'{block}: status {done.returncode}\n{done.stdout}'
+            assert done.returncode == 0, f'{block}: status {done.returncode}\n{output}'
 
     def start(self, block, words):
         """Run in the background to the end of the page; it must print the text of the mark."""
         log = self.folder / f'.log_{block.line}'
         with open(log, 'w') as file:
-            process = subprocess.Popen(words, cwd=self.folder, env=self.env, stdout=file,
-                                       stderr=subprocess.STDOUT, start_new_session=True)
+            process = self._popen(words, file)
         self.stack.callback(self.stop, block, process, log)
         end = time.monotonic() + TIMEOUT
         while block.what not in log.read_text():

@@ -9,6 +9,7 @@ import domain_coordinator
 import pytest
 import rclpy
 from ament_index_python.packages import get_package_prefix
+from ends_with_parent import end_with_parent
 from node_server import Forked, NodeServer
 from rclpy.executors import SingleThreadedExecutor
 
@@ -54,7 +55,8 @@ class Process:
         command = [path, '--ros-args', *ros_args]
         with open(log, 'w') as out:
             self.popen = (Forked(server, command, log) if server else subprocess.Popen(
-                command, stdout=out, stderr=subprocess.STDOUT, env={**os.environ, **(env or {})}))
+                command, stdout=out, stderr=subprocess.STDOUT, preexec_fn=end_with_parent,
+                env={**os.environ, **(env or {})}))
 
     def output(self):
         return self.log.read_text()

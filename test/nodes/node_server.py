@@ -14,6 +14,10 @@ import subprocess
 import sys
 import time
 from importlib import import_module
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parent.parent))  # where it is the program
+from ends_with_parent import end_with_parent
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -113,7 +117,8 @@ def serve():
 
 
 def become(request):
-    """Turn the fork into the program."""
+    """Turn the fork into the program; it ends with the server, as that does with the tests."""
+    end_with_parent()
     nothing, log = os.open(os.devnull, os.O_RDONLY), os.open(request['log'], os.O_WRONLY)
     for number, opened in enumerate((nothing, log, log)):
         os.dup2(opened, number)

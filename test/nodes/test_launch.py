@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from ends_with_parent import end_with_parent
 from rcl_interfaces.srv import GetParameters
 from uav_task_alloc_msgs import msg as m
 
@@ -35,7 +36,8 @@ class Launched:
             self.popen = subprocess.Popen(
                 [*ROS2, 'launch', 'uav_task_alloc', f'{name}.launch.py',
                  *(f'{key}:={value}' for key, value in given.items())],
-                stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
+                stdout=out, stderr=subprocess.STDOUT, start_new_session=True,
+                preexec_fn=end_with_parent)
 
     def output(self):
         return self.log.read_text()
