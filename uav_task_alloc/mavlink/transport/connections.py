@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.transport.codec import Codec, Message
 from uav_task_alloc.mavlink.transport.link import MAX_UNCONFIRMED, Link
+from uav_task_alloc.mavlink.transport.link_traffic import LinkTraffic
 from uav_task_alloc.mavlink.transport.refused_messages import RefusedMessages, failure
 from uav_task_alloc.mavlink.transport.signing import SigningClock
 
@@ -47,6 +48,7 @@ class Connections:
         self.signing = SigningClock(signing_key_file, wall) if signing_key_file else None
         self._record = open_record(tlog) if tlog else None
         self.links = list(links)  # last: iterating may open them
+        self.traffic = [LinkTraffic() for _ in self.links]
         self._encoder = Codec(system, component,
                             signing=self.signing.outgoing if self.signing else None)
         self.refusals = RefusedMessages()  # could not be decoded or encoded
@@ -70,7 +72,9 @@ class Connections:
             with self._lock:  # a link that fails drops its send buffer, which `send` may be using
                 chunks = self.links[number].read()
             for remote, data in chunks:
-                received += self._parse((number, remote), data)
+                messages = self._parse((number, remote), data)
+                self.traffic[number].add(len(data), len(messages))
+                received += messages
         return received
 
     def send(self, messages: Iterable[tuple[Any, Message]]) -> None:
@@ -98,8 +102,9 @@ class Connections:
     def step(self, now: float) -> None:
         """Reconnect links, and save the signing timestamp; `now`: steady time [s]."""
         with self._lock:
-            for link in self.links:
+            for link, traffic in zip(self.links, self.traffic, strict=True):
                 link.step(now)
+                traffic.step(now, link.opened if link.fileno() >= 0 else 0)
         if self.signing is not None:
             self.signing.step(now)
 

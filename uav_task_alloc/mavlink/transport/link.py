@@ -2,6 +2,8 @@
 """Non-blocking links: UDP in and out, TCP client, serial; the only sockets of the bridge."""
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import socket
 import termios
@@ -11,11 +13,16 @@ from contextlib import suppress
 from typing import Protocol
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mavlink.transport.host_lookup import HostLookup
 
 _CHUNK = 65536  # [B] larger than any datagram
 _BACKLOG = 65536  # [B] of the send buffer of a stream; more is dropped
 _RECONNECT = 1.0  # [s] between attempts
+_UNANSWERED = 5000  # [ms] after which a TCP peer that confirms nothing is gone; heartbeats: 1 Hz
 MAX_UNCONFIRMED = 32  # remotes of one link without a known vehicle; the latest are kept
+_TTY = 'expected a serial port'
+_SERIAL_HINTS = {errno.EISDIR: _TTY, errno.ENOTTY: _TTY, errno.EACCES: (
+    'expected a port that this user may read and write, as a member of its group (dialout)')}
 _EXPECTED = 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or /dev/tty...:BAUD'
 
 
@@ -70,7 +77,9 @@ class Udp:
                 self._socket.bind(('', 0))
         except OSError as error:
             self._socket.close()
-            raise InvalidValue('connections', name, f'a free port ({error})') from None
+            wanted = (f'a known host ({error})' if isinstance(error, socket.gaierror)
+                      else f'a free port ({error})')
+            raise InvalidValue('connections', name, wanted) from None
         self._kept: frozenset[Hashable] = self._configured
 
     @property
@@ -192,14 +201,17 @@ class Tcp(Stream):
 
     def __init__(self, name: str, host: str, port: int) -> None:
         super().__init__(name)
-        self._address = host, port
+        self._host, self._port = HostLookup(host), port
 
     def _open(self) -> int:
+        address = self._host.address(), self._port
         client = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if hasattr(socket, 'TCP_USER_TIMEOUT'):  # Linux; else it takes a quarter of an hour
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED)
         try:
-            client.connect(self._address)
+            client.connect(address)
         except BlockingIOError:
             pass  # in progress; a refusal is reported by the first read
         except OSError:
@@ -209,26 +221,43 @@ class Tcp(Stream):
 
 
 class Serial(Stream):
-    """A serial port in raw mode."""
+    """A serial port in raw mode, locked: two readers would each get a part of the bytes."""
 
     def __init__(self, name: str, path: str, baud: int) -> None:
         super().__init__(name)
         self._path = path
-        self._speed = getattr(termios, f'B{baud}', None)
-        if self._speed is None:
+        self._speed = getattr(termios, f'B{baud}', termios.B0)
+        if self._speed == termios.B0:  # which would hang up
             raise InvalidValue('connections', name, 'a usual baud rate (57600, 115200, 921600)')
 
     def _open(self) -> int:
-        port = os.open(self._path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
-            tty.setraw(port)
-            settings = termios.tcgetattr(port)
-            settings[4] = settings[5] = self._speed
-            termios.tcsetattr(port, termios.TCSANOW, settings)
+            port = os.open(self._path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError as error:
+            raise _with_hint(error) from None
+        try:
+            self._prepare(port)
         except (OSError, termios.error) as error:
             os.close(port)
-            raise OSError(str(error)) from None
+            raise _with_hint(error) from None
         return port
+
+    def _prepare(self, port: int) -> None:
+        tty.setraw(port)
+        settings = termios.tcgetattr(port)
+        settings[4] = settings[5] = self._speed
+        termios.tcsetattr(port, termios.TCSANOW, settings)
+        try:
+            fcntl.flock(port, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise OSError('in use by another program, or another of these connections') from None
+
+
+def _with_hint(error: OSError | termios.error) -> OSError:
+    """The error of a serial port in words, and what is expected, where that is known."""
+    number, text = error.args[:2] if len(error.args) > 1 else (0, str(error))
+    hint = _SERIAL_HINTS.get(number)
+    return OSError(f'{text}: {hint}' if hint else text)
 
 
 def open_link(name: str) -> Link:
@@ -252,7 +281,9 @@ def open_link(name: str) -> Link:
         raise InvalidValue('connections', name, _EXPECTED) from None
     if kind == 'serial':
         return Serial(name, host, number)
-    if kind not in ('udpin', 'udpout', 'tcp') or not 0 <= number <= 65535:
+    lowest = 0 if kind == 'udpin' else 1  # udpin: any host, any free port
+    if (kind not in ('udpin', 'udpout', 'tcp') or not lowest <= number <= 65535
+            or not (host or kind == 'udpin')):
         raise InvalidValue('connections', name, _EXPECTED)
     if kind == 'tcp':
         return Tcp(name, host, number)

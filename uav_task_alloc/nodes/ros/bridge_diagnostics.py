@@ -112,15 +112,22 @@ class BridgeDiagnostics:
         self._log.report_trouble('uav_ids', shared_ids, 'warning')
         if shared_ids:
             yield self._row('uav_ids', _WARN, shared_ids)
-        for link in self._connections.links:
-            self._log.report_trouble(link.name, link.trouble)
-            yield self._row(link.name, _ERROR if link.trouble else _OK, link.trouble or 'open')
+        yield from self._link_rows()
         if self._connections.signing is not None:
             trouble = self._connections.signing.trouble
             self._log.report_trouble('signing', trouble, 'warning')
             yield self._row('signing', _WARN if trouble else _OK, trouble or 'timestamp kept')
         yield self._heartbeat_row()
         yield self._messages_row()
+
+    def _link_rows(self) -> Iterator[DiagnosticRow]:
+        """A row for each link; one without vehicles is no line of the log, other bytes are."""
+        for link, traffic in zip(self._connections.links, self._connections.traffic, strict=True):
+            garbled = traffic.warning if traffic.is_garbled else ''
+            self._log.report_trouble(link.name, link.trouble or garbled,
+                                     'error' if link.trouble else 'warning')
+            level = _ERROR if link.trouble else _WARN if traffic.warning else _OK
+            yield self._row(link.name, level, link.trouble or traffic.warning or 'open')
 
     def _heartbeat_row(self) -> DiagnosticRow:
         beat = self._heartbeat
