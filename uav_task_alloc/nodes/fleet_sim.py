@@ -40,7 +40,8 @@ class FleetSim(Node):
         self.fleet = UdpFleet(
             [(vehicle_config(uav, played, params), uav.autopilot) for uav in played.uavs],
             known_address(params.target), params.speedup, params.log_file,
-            (played.separation.horizontal, played.separation.vertical))
+            (played.separation.horizontal, played.separation.vertical),
+            self.get_logger().error)
         self.thread = self.fleet.start()
         if params.clock:
             self.publisher = ClockPublisher(self, self.fleet.clock)

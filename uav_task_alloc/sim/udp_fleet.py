@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import os
 import select
 import socket
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.transport.codec import Codec, Message
@@ -55,18 +56,20 @@ class UdpFleet:
         log_file: of the ground truth, JSON lines; '': none.
         separation: horizontal and vertical distance [m] that UAVs in the air have to keep, for
             the ground truth; 0: no loss is judged.
+        report: called once, with why no more of the ground truth can be written.
     """
 
     def __init__(self, vehicles: Iterable[tuple[VehicleConfig, str]], target: UdpAddress,
                  speedup: float = 1.0, log_file: str | Path = '',
-                 separation: tuple[float, float] = (0.0, 0.0)) -> None:
+                 separation: tuple[float, float] = (0.0, 0.0),
+                 report: Callable[[str], object] = print) -> None:
         self.speedup = speedup
         self._start, self._epoch = time.monotonic(), time.time()
         self._lock = threading.Lock()
         self._stopping = threading.Event()
         self._endpoints = {config.uav: _Endpoint(Vehicle(config, AUTOPILOTS[autopilot]), target)
                            for config, autopilot in vehicles}
-        self._log = _Log(log_file, self._epoch) if log_file else None
+        self._log = _Log(log_file, self._epoch, report) if log_file else None
         self.judge = SeparationJudge(*separation)
         self._sample_at = self._stepped = 0.0
 
@@ -215,10 +218,12 @@ def _times(now: float, epoch: float) -> dict[str, float]:
 
 
 class _Log:
-    """The ground truth as JSON lines."""
+    """The ground truth as JSON lines, up to the first that cannot be written."""
 
-    def __init__(self, path: str | Path, epoch: float) -> None:
-        self._epoch = epoch  # of /clock [unix s]
+    def __init__(self, path: str | Path, epoch: float, report: Callable[[str], object]) -> None:
+        self._path, self._epoch, self._report = path, epoch, report  # epoch: of /clock [unix s]
+        self._file: TextIO | None = None  # None: closed
+        self._whole = 0  # [B] of complete lines on disk
         try:
             Path(path).parent.mkdir(parents=True, exist_ok=True)
             self._file = open(path, 'w', encoding='utf-8')  # noqa: SIM115 - closed by close()
@@ -255,12 +260,36 @@ class _Log:
                          'vertical': round(loss.nearest.vertical, 3)})
 
     def _write(self, line: dict[str, Any]) -> None:
-        self._file.write(json.dumps(line) + '\n')
+        if self._file is None:
+            return
+        try:
+            self._file.write(json.dumps(line) + '\n')
+        except OSError as error:  # the vehicles fly on
+            self._end(error)
 
     def flush(self) -> None:
         """Make the lines written so far visible to readers."""
-        self._file.flush()
+        if self._file is None:
+            return
+        try:
+            self._file.flush()
+            self._whole = self._file.tell()
+        except OSError as error:
+            self._end(error)
+
+    def _end(self, error: OSError) -> None:
+        """Close the file without the line that has no room, and report it."""
+        with contextlib.suppress(OSError):  # it would write the rest of the line
+            self._file and self._file.close()
+        self._file = None
+        with contextlib.suppress(OSError):
+            os.truncate(self._path, self._whole)
+        self._report(f'log_file {self._path}: {error.strerror}: the flight goes on, and no more '
+                     'of it is recorded there')
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        self.flush()
+        if self._file is not None:
+            self._file.close()
+            self._file = None

@@ -100,6 +100,7 @@ def test_a_full_disk_ends_the_recording_only(make_connections, make_remote):
     for _ in range(1000):
         connections.send_to_all(heartbeat())
     assert remote.receive()[0].get_type() == 'HEARTBEAT'
+    assert connections.record_error == 'No space left on device: no more frames are recorded'
 
 
 def test_a_recording_that_cannot_be_written_is_refused():

@@ -47,6 +47,7 @@ class Connections:
         self._ids, self._wall, self._wanted = (system, component), wall, wanted
         self.signing = SigningClock(signing_key_file, wall) if signing_key_file else None
         self._record = open_record(tlog) if tlog else None
+        self.record_error = ''  # why no more of the recording is written
         self.links = list(links)  # last: iterating may open them
         self.traffic = [LinkTraffic() for _ in self.links]
         self._encoder = Codec(system, component,
@@ -172,7 +173,9 @@ class Connections:
             return
         try:
             record.write(struct.pack('>Q', int(self._wall() * 1e6)) + frame)
-        except (OSError, ValueError):  # disk full: end the recording only
+        except (OSError, ValueError) as error:  # disk full: end the recording only
+            self.record_error = self.record_error or (
+                f'{getattr(error, "strerror", None) or error}: no more frames are recorded')
             self._record = None
             with suppress(OSError):
                 record.close()

@@ -117,6 +117,9 @@ class BridgeDiagnostics:
             trouble = self._connections.signing.trouble
             self._log.report_trouble('signing', trouble, 'warning')
             yield self._row('signing', _WARN if trouble else _OK, trouble or 'timestamp kept')
+        self._log.report_trouble('tlog', self._connections.record_error, 'warning')
+        if self._connections.record_error:
+            yield self._row('tlog', _WARN, self._connections.record_error)
         yield self._heartbeat_row()
         yield self._messages_row()
 
