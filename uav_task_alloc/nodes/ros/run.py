@@ -24,6 +24,7 @@ from rclpy.utilities import remove_ros_args
 from uav_task_alloc.errors import AllocError
 from uav_task_alloc.nodes.ros.log_callers import name_callers_by_frames
 from uav_task_alloc.nodes.ros.parameter_files import files_of, read_sections
+from uav_task_alloc.nodes.ros.security import enclave_of, security_warning
 from uav_task_alloc.parameter_field import CheckedParams
 from uav_task_alloc.parameter_texts import help_text
 
@@ -85,8 +86,12 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
     # through shared memory a node that was killed and restarted receives nothing for 3 s
     os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
     try:
+        unsecured = security_warning(os.environ, enclave_of(args or sys.argv))
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        _spin(make_node(), threads, signals)
+        node = make_node()
+        if unsecured:
+            node.get_logger().warning(unsecured)
+        _spin(node, threads, signals)
     except _REFUSALS as error:
         sys.exit(_one_line(error))
     finally:
