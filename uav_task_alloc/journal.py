@@ -156,7 +156,13 @@ class Journal:
             kind = JournalInUse
         elif code in _DAMAGED:
             kind = JournalCorrupt
-        return kind(f'{self.path} cannot be {what}: {error}')
+        return kind(f'{self.path} cannot be {what}: {error}{_denied(self.path)}')
+
+
+def _denied(path: Path) -> str:
+    """What this process may not write to, which SQLite calls an I/O error; '' for nothing."""
+    return next((f' (this user may not write to {each})' for each in (path, path.parent)
+                 if os.access(each, os.F_OK) and not os.access(each, os.W_OK)), '')
 
 
 def _primary_code(error: Exception) -> int:

@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 import pytest
 from allocation import AllocatorDriver
@@ -145,7 +146,7 @@ def unopenable(monkeypatch):
         error = sqlite3.OperationalError('attempt to write a readonly database')
         raise Journal.__new__(Journal)._error('opened', error) from error
 
-    monkeypatch.setattr(Journal, 'path', 'there', raising=False)
+    monkeypatch.setattr(Journal, 'path', Path('there'), raising=False)
     name = 'uav_task_alloc.allocator.persistence.persistence.Journal'
     monkeypatch.setattr(name, journal)
     return lambda: monkeypatch.setattr(name, Journal)

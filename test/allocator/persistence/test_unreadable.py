@@ -69,7 +69,7 @@ def test_a_journal_that_another_user_may_only_read_is_restored(tmp_path):
         path.chmod(mode)
     said = start_as_other(tmp_path / 'state')
     assert said.startswith(f'7 {file} cannot be opened: ')
-    assert said.endswith('; tried again every 1 s')
+    assert said.endswith(f' (this user may not write to {file}); tried again every 1 s')
 
 
 @needs_root
@@ -78,7 +78,8 @@ def test_a_folder_that_may_not_be_written_and_has_no_journal_ends_no_start(tmp_p
     (tmp_path / 'state').mkdir(mode=0o555)
     said = start_as_other(tmp_path / 'state')
     assert said.startswith(f'0 {tmp_path / "state" / FILE_NAME} cannot be opened: ')
-    assert said.endswith('; tried again every 1 s')
+    assert said.endswith(f' (this user may not write to {tmp_path / "state"}); '
+                         'tried again every 1 s')
 
 
 def test_a_folder_in_the_place_of_the_journal_is_refused(tmp_path):
