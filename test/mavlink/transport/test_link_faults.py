@@ -4,6 +4,7 @@ import os
 import random
 import select
 import socket
+import termios
 import threading
 import time
 
@@ -77,6 +78,28 @@ def test_a_serial_port_has_one_reader(make_connections, terminal):
     os.write(master, Codec(1, 1).pack(heartbeat()))
     assert len(receive(second)) == 1
     assert second.links[0].trouble == ''
+
+
+def test_a_serial_port_is_set_whatever_another_program_has_left(make_connections, terminal):
+    _, path = terminal
+    with open(path, 'rb', buffering=0) as port:
+        left = termios.tcgetattr(port)
+        left[2] = left[2] & ~(termios.CREAD | termios.CLOCAL) | termios.CSTOPB
+        left[4] = left[5] = termios.B1200
+        termios.tcsetattr(port, termios.TCSANOW, left)
+        make_connections(f'{path}:57600').step(0.0)
+        flags, speeds = (now := termios.tcgetattr(port))[2], now[4:6]
+    assert speeds == [termios.B57600] * 2
+    assert not flags & termios.CSTOPB
+    assert flags & termios.CREAD
+    assert flags & termios.CLOCAL
+
+
+def test_a_device_without_the_baud_rate_is_said(make_connections, terminal, monkeypatch):
+    connections = make_connections(f'{terminal[1]}:921600')
+    monkeypatch.setattr(termios, 'tcsetattr', lambda *_: None)  # as a driver that ignores it
+    connections.step(0.0)
+    assert connections.links[0].trouble == 'the device has no such baud rate'
 
 
 def warnings(connections, now):

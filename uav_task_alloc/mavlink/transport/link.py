@@ -245,8 +245,12 @@ class Serial(Stream):
     def _prepare(self, port: int) -> None:
         tty.setraw(port)
         settings = termios.tcgetattr(port)
+        # as another program may have left it: two stop bits, no receiver, modem lines that hang up
+        settings[2] = settings[2] & ~termios.CSTOPB | termios.CREAD | termios.CLOCAL
         settings[4] = settings[5] = self._speed
         termios.tcsetattr(port, termios.TCSANOW, settings)
+        if termios.tcgetattr(port)[4:6] != [self._speed, self._speed]:
+            raise OSError('the device has no such baud rate')
         try:
             fcntl.flock(port, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
