@@ -231,17 +231,18 @@ def test_one_bad_row_costs_that_row_only(disk):
     assert 'left out: journal row ' in later.persistence.error
 
 
-def test_a_journal_of_a_newer_version_is_left_alone(tmp_path):
+@pytest.mark.parametrize(('statement', 'why'), [
+    (f'PRAGMA user_version = {VERSION + 1}', 'a newer uav_task_alloc wrote it'),
+    ('ALTER TABLE world RENAME TO birds', 'it is a database of another program')])
+def test_a_journal_of_another_version_or_program_is_left_alone(tmp_path, statement, why):
     Journal(str(tmp_path)).close()
     database = sqlite3.connect(tmp_path / FILE_NAME)
-    database.execute(f'PRAGMA user_version = {VERSION + 1}')
+    database.execute(statement)
     database.close()
     before = (tmp_path / FILE_NAME).read_bytes()
-    disk = Disk(tmp_path)
-    disk.add('t1')
-    assert disk.errors == [disk.persistence.error]
-    assert disk.persistence.error.endswith(
-        'a newer uav_task_alloc wrote it; nothing is kept until a restart')
+    with pytest.raises(JournalUnreadable, match=f'{why}: expected a journal that can be read.*'
+                       'use the program that wrote it, or set another state_dir'):
+        Disk(tmp_path)
     assert (tmp_path / FILE_NAME).read_bytes() == before
 
 

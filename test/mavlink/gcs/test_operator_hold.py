@@ -148,19 +148,26 @@ def test_an_empty_list_that_returns_waits_for_the_end_of_a_hold(kind):
     assert bench.run(lambda: bench.state().mode is UavMode.RETURNING, 20.0)
 
 
-def test_a_hold_file_that_cannot_be_used_is_reported(tmp_path):
+@BOTH
+def test_a_uav_whose_hold_file_cannot_be_used_is_held_until_it_is_let_go_on(kind, tmp_path):
     reports = []
     store = HoldFileStore(str(tmp_path), reports.append)
     store.save_hold('uav_1', 'order o1 of ann')
     assert store.load_hold('uav_1') == 'order o1 of ann'
-    store.path('uav_1').write_text('{"uav_id": 3')
-    assert store.load_hold('uav_1') == ''
-    store.path('uav_1').write_text('{"uav_id": "uav_2", "reason": "x"}')
-    assert store.load_hold('uav_1') == ''
-    store.path('uav_1').write_text('[' * 4000)
-    assert store.load_hold('uav_1') == ''
+    for body in ('{"uav_id": 3', '{"uav_id": "uav_2", "reason": "x"}', '[' * 4000):
+        store.path('uav_1').write_text(body)
+        assert store.load_hold('uav_1') == 'its saved hold cannot be read; ~/resume_uav ends this'
     assert len(reports) == 3
-    assert all('not used' in text for text in reports)
+    assert all('uav_1 is held until' in text for text in reports)
+    bench = flying(kind, 'ABC')
+    bench.start()
+    bench.ground_station._hold_store = store
+    bench.discover()
+    bench.assign(task_list('ABC', 2))
+    assert bench.run(lambda: is_held(bench), 60.0)
+    hold(bench, GO_ON)
+    assert store.load_hold('uav_1') == ''
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
 
 
 def least_distance(bench, zone):

@@ -2,9 +2,9 @@
 """Saves the state of the allocator in the journal, and reads it at the start.
 
 Without a disk the allocator runs on with a warning, and what it accepts meanwhile is written when
-the disk is back. A damaged file is renamed, and a new one begun with its readable rows; a file of
-a newer version, or of another process, is left unchanged; one of another origin, or one that
-cannot be read, ends the start: the tasks in it would be forgotten.
+the disk is back. A damaged file is renamed, and a new one begun with its readable rows; one that
+another process has is left to it. A file of another origin, of a newer version or another program,
+or one that cannot be read, ends the start: the tasks in it would be forgotten.
 """
 from __future__ import annotations
 
@@ -94,9 +94,11 @@ class Persistence:
         except OriginMismatch:
             self.close()
             raise
-        except JournalForeign as error:
-            self.in_use = str(error) if isinstance(error, JournalInUse) else ''
+        except JournalInUse as error:
+            self.in_use = str(error)
             self._give_up(str(error))
+        except JournalForeign as error:
+            raise _unreadable(error) from None
         except JournalError as error:
             return self._begin_from_copy(f'{error}; tried again every {_RETRY:g} s')
         return SavedState()
@@ -106,15 +108,10 @@ class Persistence:
         rows: list[JournalRow] = []
         try:
             rows = self._recovered or read_copy(self._dir)
-        except JournalForeign as worse:
-            self._give_up(str(worse))
-            return SavedState()
         except JournalCorrupt as worse:
             self._set_lost(str(worse))
         except JournalError as worse:
-            raise JournalUnreadable(f'{worse}: expected a journal that can be read, as the tasks '
-                                    'in it would be forgotten: make it readable, or set another '
-                                    'state_dir') from None
+            raise _unreadable(worse) from None
         self._set_error(error)
         return self._checked(rows)
 
@@ -262,3 +259,10 @@ def _same_place(one: Origin, other: Origin) -> bool:
 def _origin_text(origin: Origin) -> str:
     return (f'origin latitude {origin.latitude}, longitude {origin.longitude} deg, '
             f'altitude_amsl {origin.altitude_amsl} m')
+
+
+def _unreadable(error: JournalError) -> JournalUnreadable:
+    remedy = ('use the program that wrote it' if isinstance(error, JournalForeign)
+              else 'make it readable')
+    return JournalUnreadable(f'{error}: expected a journal that can be read, as the tasks in it '
+                             f'would be forgotten: {remedy}, or set another state_dir')

@@ -17,7 +17,7 @@ class HoldStore(Protocol):
     """Stores which UAVs an operator holds, over a restart of the bridge."""
 
     def load_hold(self, uav_id: str) -> str:
-        """The reason of the hold of a UAV; '' where there is none."""
+        """The reason of the hold of a UAV, or why it is not known; '' where there is none."""
 
     def save_hold(self, uav_id: str, reason: str) -> None:
         """Save the reason of a hold, '' at its end; it is on disk when this returns."""
@@ -43,7 +43,10 @@ class HoldFileStore:
         return self._folder / uav_file_name(uav_id).replace('authority_', 'hold_', 1)
 
     def load_hold(self, uav_id: str) -> str:
-        """Return the reason of the hold saved last; '' where there is none, or it is unusable."""
+        """Return the reason of the hold saved last; '' where there is none.
+
+        Of a file that cannot be used, why: who was held stays held.
+        """
         path = self.path(uav_id)
         try:
             body = json.loads(read_file(path, _FILE_LIMIT))
@@ -53,9 +56,9 @@ class HoldFileStore:
         except FileNotFoundError:
             return ''
         except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
-            self._report(f'{path}: {error or type(error).__name__}: not used; {uav_id} is not '
-                         'held until the allocator says so again')
-            return ''
+            self._report(f'{path}: {error or type(error).__name__}: cannot be used; {uav_id} is '
+                         'held until the allocator, or ~/resume_uav, lets it go on')
+            return 'its saved hold cannot be read; ~/resume_uav ends this'
 
     def save_hold(self, uav_id: str, reason: str) -> None:
         """Write or remove the file before returning; a failure is reported."""
