@@ -12,6 +12,7 @@ from uav_task_alloc.geometry import distances
 from uav_task_alloc.geometry.detour import detour
 from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.geometry.pairs import length
+from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import ThreatZone
 
 
@@ -130,6 +131,27 @@ def test_beyond_the_table_a_cache_gives_the_same_lengths(scene, monkeypatch):
     cached = distances_among(points, zones)
     assert np.array_equal(square(cached.pairs, 30), dense)
     assert np.array_equal(square(cached.pairs, 30), dense)
+
+
+def test_beyond_the_table_easy_paths_are_found_when_the_time_is_up(monkeypatch):
+    monkeypatch.setattr(distances, 'DENSE_MAX', 0)
+    zones = [ThreatZone.cylinder('a', (500.0, 0.0), 100.0),
+             ThreatZone.cylinder('b', (500.0, 150.0), 100.0)]
+    points = [(0.0, 0.0, 0.0), (0.0, 500.0, 0.0), (1000.0, -60.0, 0.0), (1000.0, 0.0, 0.0),
+              (500.0, 0.0, 0.0), (1000.0, 10.0, 0.0)]
+    limits = {'altitude_min': 0.0, 'altitude_max': 0.0}
+    free, stopped = Distances(points, zones, **limits), SearchBudget(lambda: True)
+    assert math.isfinite(free.length(0, 3))  # and keeps the path
+    late = free.updated(budget=stopped)
+    stopped.start_stage()
+    assert stopped.is_exhausted
+    straight, past_one, stored = (0, 1), (0, 2), (0, 3)
+    for i, j in (straight, past_one, stored):
+        assert late.length(i, j) == free.length(i, j), (i, j)
+    past_both, to_inside, from_inside = (0, 5), (0, 4), (4, 0)
+    for i, j in (past_both, to_inside, from_inside):
+        assert late.length(i, j) == math.inf, (i, j)
+    assert late.given_up(*past_both)
 
 
 def test_ensured_pairs_are_known_at_once(scene):

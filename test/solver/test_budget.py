@@ -51,10 +51,27 @@ def check(result, uavs, tasks, zones):
     assert all(result.unassigned.values())
     for uav in uavs:
         here = uav.position
-        for name, leg in zip(result.routes[uav.id], result.legs[uav.id], strict=True):
+        row = result.routes[uav.id]
+        for name, leg in zip(row, result.legs[uav.id][:len(row)], strict=True):
             assert math.isfinite(leg.length)
             assert path_is_clear([here, *leg.via, place[name]], zones)
             here = place[name]
+
+
+@pytest.mark.parametrize('options', [{}, {'objective': 'response'}])
+def test_many_tasks_are_served_though_no_time_is_left_for_paths(options):
+    rng = np.random.default_rng(4)
+    side = 20_000.0
+    uavs = [Uav(f'u{k}', (*rng.uniform(0.0, side, 2), 50.0)) for k in range(8)]
+    tasks = [Task(f't{k}', (*rng.uniform(0.0, side, 2), 50.0)) for k in range(2100)]
+    zones = [ThreatZone.cylinder(f'z{k}', rng.uniform(0.0, side, 2), 500.0) for k in range(6)]
+    within = [task.id for task in tasks if any(inside(task.position, zone) for zone in zones)]
+    result = plan(uavs, tasks, zones, budget=0.0, route_end='home', clock=Ticking(), **options)
+    check(result, uavs, tasks, zones)
+    assert len(result.unassigned) <= 1.2 * len(within)
+    again = plan(uavs, tasks, zones, budget=0.0, route_end='home', clock=Ticking(), warm=result,
+                 **options)
+    assert not (set(again.unassigned) - set(result.unassigned))
 
 
 def test_finding_20_the_clock_is_read_during_path_searches():

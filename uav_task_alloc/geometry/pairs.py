@@ -83,20 +83,26 @@ def length(pairs: Pairs, i: int, j: int) -> float:
 def _search_length(pairs: Pairs, i: int, j: int, known: float) -> float:
     """Search for a length now; `known` is what an earlier search left that was cut short.
 
+    Where the time is up and there is no table, easy paths are still found: among so many points
+    few pairs are known by then, and a plan of known pairs alone would serve no task.
+
     Returns:
         [m]; -w - 1: not found with w units of work; NaN: there was no time to search.
     """
-    state = ints_at(ints_at(pairs.scene)[BUDGET_INDEX])
+    state, table = ints_at(ints_at(pairs.scene)[BUDGET_INDEX]), pairs.row > 0
     if state[EXHAUSTED] != 0:
-        return known
-    if -known > state[MAX_UNITS]:
+        if table or known < 0.0:
+            return float(known)
+    elif -known > state[MAX_UNITS]:
         state[CUT_SHORT] += 1
-        return known
+        return float(known)
     found = call_float(pairs.find, pairs.scene, i, j)
     if found == found:
         return float(found)
     state[CUT_SHORT] += 1
-    return known if state[EXHAUSTED] != 0 else -1.0 - state[MAX_UNITS]
+    if state[EXHAUSTED] == 0:
+        return -1.0 - float(state[MAX_UNITS])
+    return float(known) if table or known < 0.0 else -1.0
 
 
 @inner_allocating_kernel

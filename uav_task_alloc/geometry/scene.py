@@ -17,7 +17,7 @@ from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, first_contain
 from uav_task_alloc.geometry.path_store import PathStore, load_path, store_path
 from uav_task_alloc.geometry.points import copy_point, path_length, reverse_points
 from uav_task_alloc.geometry.search_budget import SearchBudget, is_exhausted, new_work
-from uav_task_alloc.geometry.shortest_path import path_clears, shortest_path
+from uav_task_alloc.geometry.shortest_path import easy_path, path_clears, shortest_path
 from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.kernel import allocating_kernel, c_function, inner_allocating_kernel
 
@@ -174,6 +174,26 @@ def _join(address: int, i: int, between: int) -> float:
     return length
 
 
+@inner_allocating_kernel
+def _easy_length(scene: PathScene, i: int, j: int) -> float:
+    """Length [m] of the path from i to j that takes no search: stored, straight, or past one zone.
+
+    NaN: there is none. O(zones)
+    """
+    path = np.empty((MAX_CORNERS, 3))
+    n = stored_path(scene, i, j, path)
+    if n > 0 or INSIDE in (scene.location[i], scene.location[j]):
+        return path_length(path, n) if n > 0 else np.nan
+    no_skin = scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN
+    ends = np.empty((2, 3))
+    ordered_ends(scene.xyz[i], scene.xyz[j], ends)
+    n = easy_path(scene.zones, ends, scene.limits, no_skin, path)
+    if n == 0:
+        return np.nan
+    store_path(scene.store, path, n, ends)
+    return path_length(path, n)
+
+
 def _find(address: int, i: int, j: int) -> float:
     """Length [m] of the path from point i to point j; inf: none, NaN: not known."""
     scene = scene_at(address)
@@ -183,7 +203,7 @@ def _find(address: int, i: int, j: int) -> float:
         return np.inf
     budget, to = ints_at(address)[BUDGET_INDEX], ints_at(address)[_PATH_INDEX]
     if to == 0 and is_exhausted(budget):
-        return np.nan
+        return _easy_length(scene, i, j)
     work, p, q, first = new_work(budget), scene.xyz[i], scene.xyz[j], 0.0
     if scene.location[i] == INSIDE:
         p = _exit_point(scene, i, work)

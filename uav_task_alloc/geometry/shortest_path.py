@@ -214,6 +214,28 @@ def path_clears(zones: Zones, p: Floats, n: int, floor: float, no_skin: bool) ->
 
 
 @inner_allocating_kernel
+def easy_path(zones: Zones, ends: Floats, limits: Floats, no_skin: bool, out: Floats) -> int:
+    """Write the path between two ends into `out` if it is straight, or leads past one zone.
+
+    Args:
+        zones, ends, limits, no_skin, out: as of `shortest_path`.
+
+    Returns:
+        Number of points; 0: it is neither. O(zones)
+    """
+    copy_point(ends, 0, out, 0)
+    copy_point(ends, 1, out, 1)
+    floor = min(ends[0, 2], ends[1, 2])
+    first = next_blocking(zones, 0, ends, 0, 1, floor, no_skin)
+    if first == zones.size:
+        return 2
+    if no_skin or next_blocking(zones, first + 1, ends, 0, 1, floor, no_skin) < zones.size:
+        return 0
+    n = path_past_zone(zones[first], ends, limits, floor, out)
+    return n if n > 0 and path_clears(zones, out, n, floor, False) else 0
+
+
+@inner_allocating_kernel
 def shortest_path(zones: Zones, ends: Floats, limits: Floats, no_skin: bool, out: Floats,
                   work: Ints) -> tuple[int, float]:
     """Write the shortest safe path between two ends, both outside all zones, into `out`.
@@ -226,21 +248,13 @@ def shortest_path(zones: Zones, ends: Floats, limits: Floats, no_skin: bool, out
         Number of points and length [m]. (0, inf): there is none; (0, NaN): not known, as the
         search was cut short. A path found before that is returned.
     """
-    copy_point(ends, 0, out, 0)
-    copy_point(ends, 1, out, 1)
-    floor = min(ends[0, 2], ends[1, 2])
-    first = next_blocking(zones, 0, ends, 0, 1, floor, no_skin)
-    if first == zones.size:
-        spend(work, zones.size)
-        return 2, point_distance(ends, 0, ends, 1)
-    if not no_skin and next_blocking(zones, first + 1, ends, 0, 1, floor, no_skin) == zones.size:
-        n = path_past_zone(zones[first], ends, limits, floor, out)
-        if n > 0 and path_clears(zones, out, n, floor, False):
-            spend(work, 3 * zones.size)
-            return n, path_length(out, n)
-    if spend(work, 3 * zones.size):
+    n, floor = easy_path(zones, ends, limits, no_skin, out), min(ends[0, 2], ends[1, 2])
+    cut_short = spend(work, zones.size if n == 2 else 3 * zones.size)
+    if n > 0:
+        return n, path_length(out, n)
+    if cut_short:
         return 0, np.nan
-    blocking, n, trial = np.zeros(zones.size, np.int64), 0, np.empty((MAX_CORNERS, 3))
+    blocking, trial = np.zeros(zones.size, np.int64), np.empty((MAX_CORNERS, 3))
     mark_blocking(zones, ends, 0, 1, floor, no_skin, blocking)
     for ring in _RINGS:
         known = path_length(out, n) if n else np.inf
