@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 from plan_checks import make, random_problem
 
-from uav_task_alloc.model import Task, ThreatZone
-from uav_task_alloc.solver.insertion import insert_cheapest_first
+from uav_task_alloc.model import Task, ThreatZone, Uav
+from uav_task_alloc.solver.insertion import best_place, insert_cheapest_first
 from uav_task_alloc.solver.neighbours import find_nearest
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.rng import below, rng_state, uniform
@@ -19,6 +19,7 @@ from uav_task_alloc.solver.routes import (
     DISTANCE,
     copy,
     empty_routes,
+    insert,
     leg_length,
     total_cost,
     update_sums,
@@ -149,6 +150,23 @@ def test_few_searches_start_from_a_task_that_a_zone_contains():
     known = ~np.isnan(problem.distances._table.cells[slots[7]])
     assert known.sum() < 60  # from neighbours
     assert routes.uav_of[problem.arrays.uavs + 7] < 0
+
+
+def test_legs_past_zones_to_places_that_are_too_far_are_not_looked_up():
+    rng = np.random.default_rng(6)
+    uavs = Uav('here', (0.0, 0.0, 0.0)), Uav('there', (9000.0, 0.0, 0.0))
+    tasks = [Task(f't{k}', (x, *rng.uniform(0.0, 500.0, 2))) for k in range(80)
+             for x in rng.uniform(0.0, 500.0, 1) + 9000.0 * (k % 2)]
+    zone = ThreatZone.cylinder('z', (4000.0, 250.0), 100.0)
+    problem = make_problem(uavs, tasks, {}, Limits((zone,)), Rules())
+    a, routes = problem.arrays, empty_routes(problem.arrays)
+    for node in range(a.uavs + 1, a.ends):
+        insert(a, routes, node, routes.prev[a.ends + (node - a.uavs) % 2])
+    place, cost = best_place(a, routes, a.uavs)
+    assert routes.uav_of[place] == 0
+    assert cost < 500.0
+    far = np.arange(a.uavs + 3, a.ends, 2)
+    assert np.isnan(problem.distances.known_lengths(np.full(far.size, a.uavs), far)).all()
 
 
 def test_random_numbers_are_uniform_and_repeatable():

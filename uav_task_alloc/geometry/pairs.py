@@ -25,7 +25,7 @@ from uav_task_alloc.geometry.scene import (
 )
 from uav_task_alloc.geometry.search_budget import CUT_SHORT, EXHAUSTED, MAX_UNITS
 from uav_task_alloc.geometry.shortest_path import path_clears
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel, inner_kernel
 
 CACHE_SIZE = 1 << 20  # lengths kept where there is no table; a power of two
 
@@ -77,6 +77,21 @@ def length(pairs: Pairs, i: int, j: int) -> float:
     dx, dy, dz = xyz[3 * i] - xyz[3 * j], xyz[3 * i + 1] - xyz[3 * j + 1], xyz[
         3 * i + 2] - xyz[3 * j + 2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@inner_kernel
+def is_enclosed(pairs: Pairs, i: int) -> bool:
+    """Return whether a point is inside a zone. O(1)
+
+    Args:
+        pairs: arrays of `Distances`, of n points.
+        i: of the point, in 0..n-1.
+
+    Returns:
+        True: no path leads to it.
+    """
+    return bool(pairs.zones > 0
+                and ints_at(ints_at(pairs.scene)[LOCATION_INDEX])[i] == INSIDE)
 
 
 @inner_allocating_kernel

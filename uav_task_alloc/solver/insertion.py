@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from uav_task_alloc.geometry.pairs import is_enclosed
 from uav_task_alloc.kernel import (
     allocating_kernel,
     inline_kernel,
@@ -23,6 +24,7 @@ from uav_task_alloc.solver.routes import (
     insert,
     leg_length,
     lengthening_cost,
+    straight_length,
 )
 
 
@@ -84,18 +86,31 @@ def best_near_place(a: Arrays, r: Routes, t: int, k: int, blinks: float,
     return best, least
 
 
+@inline_kernel
+def _straight_cost(a: Arrays, r: Routes, t: int, before: int) -> float:
+    """Cost [m] of t after node `before` if both legs were straight: the least it may be. O(1)."""
+    u, then = r.uav_of[before], r.next[before]
+    home = then < a.ends or a.returns
+    delta = straight_length(a, before, t) + (straight_length(a, t, then) if home else 0.0)
+    return lengthening_cost(a, r, u, delta - r.leg[before])
+
+
 @inner_kernel
 def best_place(a: Arrays, r: Routes, t: int) -> tuple[int, float]:
     """The cheapest place in all routes: (node before or -1, cost [m]). O(n)."""
     best, least = -1, np.inf
+    if is_enclosed(a.pairs, SIGNED(t)):
+        return best, least
     for u in range(a.uavs):
         if not a.compatible[u, t - a.uavs]:
             continue
         before = NODE(u)
         while before < a.ends:
-            delta = cost_after(a, r, t, before, leg_length(a, before, t), least)
-            if delta < least:
-                best, least = before, delta
+            # past zones it takes long to look a leg up
+            if a.straight or not _straight_cost(a, r, t, before) >= least:
+                delta = cost_after(a, r, t, before, leg_length(a, before, t), least)
+                if delta < least:
+                    best, least = before, delta
             before = r.next[before]
     return best, least
 

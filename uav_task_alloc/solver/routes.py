@@ -62,6 +62,19 @@ class Routes(NamedTuple):
 
 
 @inline_kernel
+def straight_length(a: Arrays, i: int, j: int) -> float:
+    """Return the straight distance [m] of two nodes. O(1).
+
+    Args:
+        a: arrays of the problem.
+        i: a node.
+        j: a node.
+    """
+    x, y, z = a.xyz[i, 0] - a.xyz[j, 0], a.xyz[i, 1] - a.xyz[j, 1], a.xyz[i, 2] - a.xyz[j, 2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@inline_kernel
 def leg_length(a: Arrays, i: int, j: int) -> float:
     """Return the length of the leg between two nodes. O(1) where it is known.
 
@@ -79,8 +92,7 @@ def leg_length(a: Arrays, i: int, j: int) -> float:
         if not a.returns:
             return 0.0
     if a.straight:
-        x, y, z = a.xyz[i, 0] - a.xyz[j, 0], a.xyz[i, 1] - a.xyz[j, 1], a.xyz[i, 2] - a.xyz[j, 2]
-        return math.sqrt(x * x + y * y + z * z)
+        return straight_length(a, i, j)
     return float(length(a.pairs, SIGNED(i), SIGNED(j)))
 
 

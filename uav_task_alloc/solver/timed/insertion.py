@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from uav_task_alloc.geometry.outline import Ints
+from uav_task_alloc.geometry.pairs import is_enclosed
 from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import SIGNED
@@ -268,7 +269,7 @@ def insert_in_order(a: TimedArrays, r: TimedRoutes, tasks: Ints, prizes: bool,
         if r.link[t, at.OF_UAV] != a.uavs:
             continue
         place, kind, cost = near_place(a, r, t, True, 0.0, math.inf, rng)
-        if place < 0:
+        if place < 0 and not is_enclosed(a.pairs, a.point[t]):
             place, kind, cost = place_anywhere(a, r, t)
         if place >= 0 and (not prizes or cost < a.unserved[t - a.uavs]):
             insert_task(a, r, t, LINK(place), kind)

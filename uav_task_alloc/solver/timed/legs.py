@@ -18,6 +18,19 @@ def leg_of(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> tuple[floa
 
     The length counts the path of node i, too.
     """
+    return _leg(a, r, u, i, j, not a.straight)
+
+
+@inline_kernel
+def least_leg(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> tuple[float, float]:
+    """As `leg_of`, without zones. O(1)."""
+    return _leg(a, r, u, i, j, False)
+
+
+@inline_kernel
+def _leg(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int,
+         zones: bool) -> tuple[float, float]:
+    """See `leg_of`; zones: the leg leads past them."""
     own = way_length(a, i)
     if j >= a.ends and j < a.bases:
         if i < a.uavs:
@@ -37,7 +50,7 @@ def leg_of(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> tuple[floa
     metres = math.sqrt(square + z * z)
     up = z * a.pace[u, 1] if z > 0.0 else -z * a.pace[u, 2]
     seconds = max(math.sqrt(square) * a.pace[u, 0], up)
-    if a.straight:
+    if not zones:
         return metres + own, seconds
     found = length(a.pairs, a.point[i], a.point[j])
     if found <= metres * (1.0 + 1e-12):

@@ -7,7 +7,7 @@ import math
 from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.legs import after_leg, leg_of, slot_of
+from uav_task_alloc.solver.timed.legs import after_leg, least_leg, leg_of, slot_of
 from uav_task_alloc.solver.timed.route_sums import finish_cost
 from uav_task_alloc.solver.timed.ways import TURNED, directions, face, has_paths, service_of
 
@@ -78,17 +78,40 @@ def _trip_excess(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, slot: i
 @inline_kernel
 def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: float) -> float:
     """Cost of inserting t after node c of UAV u's route; >= least if not less. O(1)."""
-    then = r.link[c, at.NEXT]
+    then, head = r.link[c, at.NEXT], r.link[c, at.HEAD] if a.whole else LINK(u)
+    if not a.straight:  # past zones it takes long to look a leg up
+        metres, seconds = least_leg(a, r, u, c, t)
+        more, further = least_leg(a, r, u, t, then)
+        added = metres + more - r.row[c, at.LEG]
+        cost, _, _ = _legs_cost(a, r, u, t, c, head, added, seconds, further, least)
+        if cost >= least:
+            return math.inf
     metres, seconds = leg_of(a, r, u, c, t)
     more, further = leg_of(a, r, u, t, then)
     added = metres + more - r.row[c, at.LEG]
+    cost, start, arrival = _legs_cost(a, r, u, t, c, head, added, seconds, further, least)
+    if cost >= least:
+        return math.inf
+    cost += _trip_excess(a, r, u, t, c, slot_of(a, head), added, seconds, further)
+    if a.timed_cost and cost < least:
+        cost += cost_of_delay(a, r, u, t, start, then, arrival)
+        if a.whole and a.fixed[t, at.TRIP_RELEASE] > -math.inf:
+            cost += _cost_of_hold(a, r, t, head, then)
+    return float(cost)
+
+
+@inline_kernel
+def _legs_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, head: int, added: float,
+               seconds: float, further: float, least: float) -> tuple[float, float, float]:
+    """Cost of t after node c by length and windows; its start and the next arrival [s]. O(1).
+
+    added [m]: by the legs to t and on, which take `seconds` and `further`. Not less with longer
+    ones; inf where it is not less than `least`.
+    """
     cost = a.weight[at.BY_DISTANCE] * added
-    if cost >= least or not added < math.inf:
-        return math.inf
-    head = r.link[c, at.HEAD] if a.whole else LINK(u)
-    if not fits_trip(a, u, t, head):
-        return math.inf
-    slot = slot_of(a, head)
+    if cost >= least or not added < math.inf or not fits_trip(a, u, t, head):
+        return math.inf, 0.0, 0.0
+    then = r.link[c, at.NEXT]
     departure, warp = r.row[c, at.DEPARTURE], 0.0
     if a.whole and a.fixed[t, at.TRIP_RELEASE] > -math.inf:
         hold = a.fixed[t, at.TRIP_RELEASE]
@@ -107,14 +130,7 @@ def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: fl
     known = r.route[u, at.WARP]
     warp += r.row[c, at.WARP_BEFORE] + r.row[then, at.WARP_AFTER]
     cost += cost_of_excess(a.price[at.WARP], known, warp)
-    if cost >= least:
-        return math.inf
-    cost += _trip_excess(a, r, u, t, c, slot, added, seconds, further)
-    if a.timed_cost and cost < least:
-        cost += cost_of_delay(a, r, u, t, start, then, arrival)
-        if a.whole and a.fixed[t, at.TRIP_RELEASE] > -math.inf:
-            cost += _cost_of_hold(a, r, t, head, then)
-    return float(cost)
+    return float(cost), start, arrival
 
 
 @inline_kernel
