@@ -78,7 +78,7 @@ def test_the_best_of_all_routes_is_found_where_all_tasks_are_near(seed, returns)
 def test_a_route_of_few_kept_labels_is_allowed_and_has_no_task_of_others(seed, zones):
     problem = problem_of(seed, 60, uavs=2, zones=zones)
     a, routes = problem.arrays, empty_timed_routes(problem.arrays)
-    first = first_plan(problem, WarmState())
+    first = first_plan(problem, WarmState())[0]
     set_order(a, routes, first.order)
     others = {t for t in range(a.uavs, a.ends) if routes.link[t, at.OF_UAV] == 0}
     room = empty_labels(60, 5)
@@ -108,7 +108,7 @@ def test_rebuilt_routes_serve_more_and_are_those_set(uavs):
     gained = 0.0
     for seed in range(6):
         problem = problem_of(seed, 80, uavs)
-        routes, best = empty_timed_routes(problem.arrays), first_plan(problem, WarmState())
+        routes, best = empty_timed_routes(problem.arrays), first_plan(problem, WarmState())[0]
         before = float(best.score[BEST_WORTH])
         rebuild(problem.arrays, routes, best, False, 1e9)
         assert best.score[BEST_WORTH] >= before
@@ -127,7 +127,7 @@ HOME = Rules(returns=True)
     (1, 1e9, Rules(returns=True, trips=2))])
 def test_routes_stay_where_labels_do_not_pay_or_do_not_hold(uavs, most, rules):
     problem = problem_of(3, 80, uavs, rules)
-    best = first_plan(problem, WarmState())
+    best = first_plan(problem, WarmState())[0]
     before = copy_incumbent(best)
     rebuild(problem.arrays, empty_timed_routes(problem.arrays), best, False, most)
     assert (best.order == before.order).all()
@@ -140,4 +140,4 @@ def test_a_plan_by_labels_is_valid_and_serves_no_less():
                         params=SELECTION)
     trips = {uav: [list(route)] for uav, route in found.routes.items()}
     assert not evaluate_routes(base.uavs, base.tasks, base.rules, trips).violations
-    assert found.value > float(first_plan(problem, WarmState()).score[BEST_WORTH])
+    assert found.value > float(first_plan(problem, WarmState())[0].score[BEST_WORTH])

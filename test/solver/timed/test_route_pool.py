@@ -113,7 +113,7 @@ def test_a_combination_that_serves_more_is_found_at_a_low_price(share):
 
 def test_the_search_goes_on_from_a_better_combination():
     problem, good = sides()
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 0, SELECTION)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 0, SELECTION)
     a, worse = colony.arrays, set_routes(problem, {'a': good[0]})
     route_order(a, worse, colony.best.order)
     colony.best.score[:2] = cost(problem, worse), worse.sums[at.SERVED_WORTH]
@@ -127,7 +127,7 @@ def test_the_search_goes_on_from_a_better_combination():
 
 def test_a_search_collects_the_routes_that_it_flies():
     problem, _ = sides()
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 0, SELECTION)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 0, SELECTION)
     colony.fly(0.0, 0.2, 200)
     pool, a = colony._pool, colony.arrays
     assert 0 < pool.size[0] <= MAX_COLUMNS
@@ -158,6 +158,6 @@ def test_it_is_for_few_uavs_single_trips_and_costs_that_add_up_by_route():
 
 def _collects(problem, params):
     """Whether a search with these parameters collects its routes."""
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 0, params)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 0, params)
     collect_routes(problem.arrays, set_routes(problem, {'u0': ['t1']}), colony._pool)
     return bool(colony._pool.size[0] > 0)

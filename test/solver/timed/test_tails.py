@@ -69,7 +69,7 @@ def test_sums_after_exchanges_are_those_of_routes_set_at_once(objective):
         problem = timed(fleet, work, objective=OBJECTIVES[objective])
         a, routes, w, rng = problem.arrays, empty_timed_routes(problem.arrays), empty_round(
             problem.arrays), rng_state(seed)
-        set_order(a, routes, first_plan(problem, WarmState()).order)
+        set_order(a, routes, first_plan(problem, WarmState())[0].order)
         for _ in range(20):  # rounds that are all kept make the routes worse
             begin_round(routes, w)
             list_absent(a, routes, w)

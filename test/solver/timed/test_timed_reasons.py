@@ -5,6 +5,8 @@ import math
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.solve import plan
+from uav_task_alloc.solver.timed import solve
+from uav_task_alloc.solver.timed.reasons import NO_PLACE_IN_TIME
 
 BASE = (0.0, 0.0, 0.0)
 
@@ -18,6 +20,16 @@ def test_a_task_that_is_too_late_names_the_earliest_arrival():
             Uav('near', BASE, cruise_speed=10.0)]
     task = Task('t', (1000.0, 0.0, 0.0), latest=60.0)
     assert reason(uavs, task) == 'latest 60 s; the earliest arrival is 100 s (near)'
+
+
+def test_a_task_without_time_to_try_all_places_says_so(monkeypatch):
+    monkeypatch.setattr(solve, 'LEAST_PLACES', 0)
+    uav = Uav('a', BASE, cruise_speed=10.0)
+    tasks = [Task('there', (1000.0, 0.0, 0.0), value=2.0, latest=101.0),
+             Task('opposite', (-900.0, 0.0, 0.0), latest=101.0)]
+    assert plan([uav], tasks, budget=0.0).unassigned == {'opposite': NO_PLACE_IN_TIME}
+    assert plan([uav], tasks, budget=0.01).unassigned == {
+        'opposite': 'left out: windows do not suffice for all tasks'}
 
 
 def test_a_payload_that_is_too_heavy_names_the_largest_capacity():

@@ -42,7 +42,8 @@ def two_bases(seed, tasks=8):
 def some_routes(problem, rng):
     """All tasks inserted in random order; some of them may have no place."""
     a, routes = problem.arrays, empty_timed_routes(problem.arrays)
-    insert_in_order(a, routes, rng.permutation(np.arange(a.uavs, a.ends)), False, rng_state(0))
+    insert_in_order(a, routes, rng.permutation(np.arange(a.uavs, a.ends)), False, 1 << 40,
+                    rng_state(0))
     return routes
 
 

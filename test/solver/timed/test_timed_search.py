@@ -70,7 +70,7 @@ def test_sums_kept_during_search_are_those_of_routes_set_at_once(objective, trip
     fleet, work = mixed_problem(trips)
     rules = Rules(returns=True, objective=objective, trips=trips)
     problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3, COLD)
     colony.fly(0.0, 0.5, 2000)
     order = np.zeros(len(problem.arrays.fixed), LINK)
     route_order(colony.arrays, colony.routes, order)
@@ -153,7 +153,7 @@ def test_a_later_departure_that_delays_locked_tasks_is_not_worse_than_the_first_
 def test_a_long_search_passes_through_excess_and_its_best_has_none():
     fleet, work = mixed_problem(11)
     problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules(returns=True)), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3, COLD)
     excess, scores = set(), []
     for share in np.arange(0.0, 0.6, 0.01):
         colony.fly(share, share + 0.01, 100)
@@ -179,7 +179,7 @@ def test_of_two_tasks_the_one_announced_later_is_served_where_only_one_can_be():
 def test_a_search_through_excess_that_finds_nothing_better_goes_on_without():
     fleet, work = mixed_problem(11)
     problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules(returns=True)), {})
-    start = first_plan(problem, WarmState())
+    start = first_plan(problem, WarmState())[0]
     colony = TimedColony(problem, start, 3, COLD)
     colony.best.score[:2] = -1.0, math.inf  # nothing is better
     for share in np.arange(0.0, 0.9, 0.01):
@@ -216,7 +216,7 @@ def test_neighbours_passed_over_have_no_cheaper_place(
         work = [replace(task, payload=0.0) for task in work]
     rules = Rules(returns=returns, grain=grain, objective=OBJECTIVES[objective])
     problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3,
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3,
                          replace(COLD, by_gaps=gaps))
     if priced:
         colony._allow_excess()
@@ -251,7 +251,7 @@ def test_reach_and_gaps_kept_during_search_are_those_of_the_legs(whole, gaps):
         fleet = [replace(uav, endurance=math.inf) for uav in fleet]
         work = [replace(task, payload=0.0) for task in work]
     problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules(returns=True)), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3,
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3,
                          replace(COLD, by_gaps=gaps))
     colony.fly(0.0, 0.5, 2000)
     a, routes = colony.arrays, colony.routes
@@ -274,7 +274,7 @@ def test_a_round_that_is_given_up_would_not_have_cost_less_than_the_limit(object
     fleet, work = mixed_problem(14)
     rules = Rules(returns=True, objective=OBJECTIVES[objective])
     problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3, COLD)
     colony.fly(0.0, 0.5, 500)
     a, routes, w, rng = colony.arrays, colony.routes, empty_round(colony.arrays), rng_state(1)
     given_up = 0
@@ -301,7 +301,7 @@ def test_a_place_costs_what_it_adds_to_all_ends_that_are_nearly_the_last_one(res
                  service_time=5.0) for i in range(30)]
     rules = Rules(returns=True, objective=Objective(1e-3, 1.0, response))
     problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3, COLD)
     colony.fly(0.0, 0.5, 300)
     a, routes, w, counted = colony.arrays, colony.routes, empty_round(colony.arrays), 0
     ends = routes.route[:, at.END]
@@ -333,7 +333,7 @@ def test_all_ends_count_unless_something_else_has_a_price(prices, hard, count):
     fleet, work = mixed_problem(16)
     rules = Rules(hard=hard, objective=Objective(1e-3, 1.0, **prices))
     problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3, COLD)
     colony.fly(0.0, 0.5, 10)
     assert (colony.arrays.weight[at.FINISH_FROM] < math.inf) == count
 

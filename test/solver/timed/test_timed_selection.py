@@ -35,7 +35,7 @@ def selection_problem():
 def test_a_round_passes_over_absent_tasks_but_the_one_it_starts_at(skipped, most):
     problem = selection_problem()
     a, routes, found = problem.arrays, empty_timed_routes(problem.arrays), set()
-    start, w, rng = first_plan(problem, WarmState()), empty_round(problem.arrays), rng_state(1)
+    start, w, rng = first_plan(problem, WarmState())[0], empty_round(problem.arrays), rng_state(1)
     absent = start.order == np.arange(len(start.order))
     for _ in range(200):
         set_order(a, routes, start.order)
@@ -49,7 +49,7 @@ def test_a_round_passes_over_absent_tasks_but_the_one_it_starts_at(skipped, most
 def test_a_round_inserts_by_value_and_chance():
     problem = selection_problem()
     a, routes = problem.arrays, empty_timed_routes(problem.arrays)
-    start, w, rng = first_plan(problem, WarmState()), empty_round(a), rng_state(1)
+    start, w, rng = first_plan(problem, WarmState())[0], empty_round(a), rng_state(1)
     ratios = set()
     for _ in range(20):
         set_order(a, routes, start.order)
@@ -70,7 +70,7 @@ def test_leaving_a_task_out_costs_much_more_than_serving_tasks_in_clusters():
                  latest=300.0, service_time=120.0) for x, y in corners for i in range(20)]
     fleet = [Uav('u', (0.0, 0.0, 0.0)), Uav('v', (0.0, 0.0, 0.0))]
     problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules()), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, SELECTION)
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3, SELECTION)
     before = colony.arrays.unserved.copy()
     values = np.array([task.value for task in work])
     colony.fly(0.0, 0.2, 200)
@@ -105,7 +105,7 @@ def test_no_neighbour_is_passed_over_at_which_a_place_costs_less(unserved, price
     fleet, work = windows_problem()
     rules = Rules(returns=True, objective=Objective(unserved=unserved))
     problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
-    colony = TimedColony(problem, first_plan(problem, WarmState()), 3,
+    colony = TimedColony(problem, first_plan(problem, WarmState())[0], 3,
                          replace(COLD, by_gaps=True))
     if priced:
         colony._allow_excess()

@@ -31,6 +31,13 @@ def test_an_earlier_plan_stays_where_it_still_holds():
     assert after.warm_started
 
 
+def test_an_earlier_plan_stays_where_no_time_is_left_to_try_places(monkeypatch):
+    monkeypatch.setattr(solve, 'LEAST_PLACES', 0)
+    uavs, tasks = [Uav('a', BASE), Uav('b', (0.0, 500.0, 0.0))], line(6, latest=500.0)
+    before = plan(uavs, tasks, budget=0.02)
+    assert plan(uavs, tasks, budget=0.0, warm=before).routes == before.routes
+
+
 def test_a_task_that_is_too_late_by_now_leaves_the_plan():
     uav = Uav('a', BASE, cruise_speed=10.0)
     tasks = [*line(2, latest=60.0), Task('new', (-100.0, 0.0, 0.0))]
@@ -95,7 +102,7 @@ def test_a_search_goes_on_from_other_routes_where_there_are_rounds_enough(rounds
     uavs, tasks, before = after_a_loss('finish')
     rules = Rules(objective=OBJECTIVES['finish'])
     problem = make_timed(make_problem(uavs, tasks, {}, Limits(), rules), {})
-    first, begin = first_plan(problem, before.state), first_plan(problem, WarmState())
+    first, begin = first_plan(problem, before.state)[0], first_plan(problem, WarmState())[0]
     colony = TimedColony(problem, first, 1, WARM_AND_FRESH, begin)
     colony.fly(0.0, 0.02, rounds)
     colony.fly(0.3, 0.5, 0)

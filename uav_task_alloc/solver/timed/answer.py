@@ -52,8 +52,9 @@ def to_timed_plan(problem: TimedProblem, recorder: TimedRecorder, best: Incumben
     found = evaluate_trips(problem, trips, legs, turned)
     missing = [i for i, task in enumerate(base.tasks) if task.id not in served]
     routes = {uav_id: tuple(chain.from_iterable(rows)) for uav_id, rows in trips.items()}
+    reasons = timed_reasons(problem, missing, recorder.untried)
     return Plan(
-        routes, timed_reasons(problem, missing), found.distance, found.value, found.penalty,
+        routes, reasons, found.distance, found.value, found.penalty,
         fit(found.distance, found.value, found.penalty, base.rules.weights),
         tuple(recorder.history), None, legs, base.rules.returns, solver, recorder.elapsed(),
         recorder.iterations, warm, found.cost, lambda: found.timetable, reversed=turned,

@@ -257,22 +257,26 @@ def unlink(a: TimedArrays, r: TimedRoutes, t: int) -> None:
 
 
 @inner_kernel
-def insert_in_order(a: TimedArrays, r: TimedRoutes, tasks: Ints, prizes: bool,
+def insert_in_order(a: TimedArrays, r: TimedRoutes, tasks: Ints, prizes: bool, most: int,
                     rng: RngState) -> int:
-    """Insert task nodes in the given order, each where it costs least; returns how many failed.
+    """Insert task nodes in the given order, each where it costs least. O(len(tasks) k + most)
 
-    prizes: a task is left out if it costs more than its price. O(len(tasks) n) at worst.
+    prizes: a task is left out if it costs more than its price; most: places that are tried for
+    tasks that may not be beside any neighbour. Returns the index from which on such tasks were
+    tried nowhere else, len(tasks): none was.
     """
-    missing = 0
+    limited = tasks.size
     for i in range(tasks.size):
         t = LINK(tasks[i])
         if r.link[t, at.OF_UAV] != a.uavs:
             continue
         place, kind, cost = near_place(a, r, t, True, 0.0, math.inf, rng)
-        if place < 0 and not is_enclosed(a.pairs, a.point[t]):
-            place, kind, cost = place_anywhere(a, r, t)
+        if place < 0 and limited == tasks.size and not is_enclosed(a.pairs, a.point[t]):
+            most -= a.uavs + r.counts[at.SERVED]
+            if most >= 0:
+                place, kind, cost = place_anywhere(a, r, t)
+            else:
+                limited = i
         if place >= 0 and (not prizes or cost < a.unserved[t - a.uavs]):
             insert_task(a, r, t, LINK(place), kind)
-        else:
-            missing += 1
-    return missing
+    return int(limited)

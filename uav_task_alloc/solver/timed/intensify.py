@@ -18,7 +18,7 @@ from uav_task_alloc.solver.timed.recombine import collect_timed, empty_timed_poo
 from uav_task_alloc.solver.timed.round import Round
 from uav_task_alloc.solver.timed.search import Incumbent
 from uav_task_alloc.solver.timed.tails import exchange_tails
-from uav_task_alloc.solver.timed.warm import fill_routes, no_routes
+from uav_task_alloc.solver.timed.warm import LEAST_PLACES, fill_routes, no_routes
 
 MANY_TASKS = 200  # tasks from which on it is worth to compile further kernels
 TAIL_SHARE = 0.25  # of the tasks, at which ends of routes are exchanged after a flight
@@ -106,6 +106,6 @@ def fly_instead(a: TimedArrays, found: Sequence[Sequence[int]], prizes: bool, be
         order[nodes[:-1]] = nodes[1:]
     set_order(a, routes, order)
     every = np.arange(a.uavs, a.ends)
-    fill_routes(a, routes, no_routes(a), every[order[a.uavs:a.ends] == every], prizes, best,
-                rng_state(0))
+    fill_routes(a, routes, no_routes(a), every[order[a.uavs:a.ends] == every], prizes,
+                LEAST_PLACES, best, rng_state(0))
     set_order(a, routes, best.order)

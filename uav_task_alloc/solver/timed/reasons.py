@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from uav_task_alloc.solver.timed.ways import directions, face, has_paths, servic
 from uav_task_alloc.solver.way_reasons import WayReasons
 
 _ARRIVAL, _LATE, _LENGTH, _SECONDS, _END = range(5)  # columns of needs_alone
+NO_PLACE_IN_TIME = ('left out: no place in a route was found in the time; searched for again with '
+                    'the next plan')
 _NAMED = 3  # UAVs that a text names
 
 
@@ -67,12 +69,14 @@ def needs_alone(a: TimedArrays, r: TimedRoutes, t: int, turned: bool, needs: Flo
         needs[u, 4] = start + service + further
 
 
-def timed_reasons(problem: TimedProblem, missing: Sequence[int]) -> dict[str, str]:
+def timed_reasons(problem: TimedProblem, missing: Sequence[int],
+                  untried: Collection[int] = ()) -> dict[str, str]:
     """Why each of these tasks is in no route.
 
     Args:
         problem: what was solved.
         missing: indices of the tasks.
+        untried: indices of tasks for which there was no time to try all places.
 
     Returns:
         A text for each task id.
@@ -81,7 +85,8 @@ def timed_reasons(problem: TimedProblem, missing: Sequence[int]) -> dict[str, st
         return {}
     routes, ways, scarce = (empty_timed_routes(problem.arrays), WayReasons(problem.base),
                             _scarce(problem))
-    return {problem.base.tasks[i].id: _reason(problem, routes, ways, scarce, i) for i in missing}
+    return {problem.base.tasks[i].id: _reason(problem, routes, ways,
+                                              '' if i in untried else scarce, i) for i in missing}
 
 
 def _reason(problem: TimedProblem, routes: TimedRoutes, ways: WayReasons, scarce: str,
@@ -91,6 +96,8 @@ def _reason(problem: TimedProblem, routes: TimedRoutes, ways: WayReasons, scarce
     if fixed:
         return fixed
     if can_serve(a, routes, a.uavs + i):
+        if not scarce:
+            return NO_PLACE_IN_TIME
         if problem.prizes:
             return 'left out: it is not worth its way'
         return f'left out: {scarce} do not suffice for all tasks'

@@ -59,7 +59,7 @@ def rebuild(a: TimedArrays, r: TimedRoutes, best: Incumbent, prizes: bool, most:
         u, worth = call % a.uavs, float(best.score[BEST_WORTH])
         label = best_label(a, r, u, room, float(ends[u]), price)
         set_order(a, r, _with_route(a, best.order, u, room, label))
-        fill_routes(a, r, no_routes(a), np.empty(0, np.int64), prizes, best, rng_state(0))
+        fill_routes(a, r, no_routes(a), np.empty(0, np.int64), prizes, 0, best, rng_state(0))
         set_order(a, r, best.order)
         stayed = 1 if best.score[BEST_WORTH] > worth else stayed + 1
         if stayed == a.uavs:

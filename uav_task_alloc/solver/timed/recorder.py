@@ -28,6 +28,8 @@ class TimedRecorder(Progress):
     problem: TimedProblem
     best: Incumbent = field(init=False)
     locked_sums: tuple[float, float, float] = field(init=False)  # as those of _locked_sums
+    # indices of tasks that the first plan tried beside their neighbours only, and left out
+    untried: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         self.locked_sums = _locked_sums(self.problem)

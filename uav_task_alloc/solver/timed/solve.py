@@ -40,10 +40,11 @@ from uav_task_alloc.solver.timed.recorder import TimedRecorder
 from uav_task_alloc.solver.timed.round import empty_round
 from uav_task_alloc.solver.timed.route_pool import may_combine
 from uav_task_alloc.solver.timed.search import BEST_WORTH, FEW_ABSENT, Incumbent
-from uav_task_alloc.solver.timed.warm import completed, first_plan
+from uav_task_alloc.solver.timed.warm import LEAST_PLACES, completed, first_plan
 from uav_task_alloc.solver.warm import WarmState
 
 SOLVER_NAME = 'chain_q'
+PLACES_A_SECOND = 10_000_000  # of budget, that a first plan tries besides LEAST_PLACES
 MANY_NEW = 0.05  # share of the tasks that are not in the routes of the earlier plan
 
 
@@ -103,11 +104,12 @@ def _improve(recorder: TimedRecorder, seed: int, before: WarmState,
              params: TimedParams | None) -> Incumbent:
     """Make a first plan and improve it until the budget ends; returns the first one."""
     problem = recorder.problem
-    first = first_plan(problem, before)
+    most = LEAST_PLACES + int(PLACES_A_SECOND * recorder.budget)
+    first, recorder.untried = first_plan(problem, before, most)
     recorder.offer(first)
     if not problem.base.tasks or not problem.base.uavs or recorder.over():
         return first
-    begin = first_plan(problem, WarmState()) if _many_new(problem, before) else None
+    begin = first_plan(problem, WarmState(), most)[0] if _many_new(problem, before) else None
     params = params or (WARM_AND_FRESH if begin else _params(problem, first, recorder.warm))
     run_colonies([TimedColony(problem, first, seed + 7919 * i, params, begin)
                   for i in range(recorder.threads)], recorder)

@@ -27,6 +27,10 @@ from uav_task_alloc.solver.timed.visits import BASE_BEFORE, NO_VISIT, free_visit
 from uav_task_alloc.solver.timed.ways import TURNED, face, has_paths, is_turned
 from uav_task_alloc.solver.warm import WarmState
 
+NO_LIMIT = np.iinfo(np.int64).max
+# places tried for tasks that may not be beside a neighbour, whatever the budget: no task of 2000
+# is tried at fewer than all
+LEAST_PLACES = 4_000_000
 MOST_PLACES = 1_000_000  # absent tasks times tasks that `completed` tries
 _VISIT = -1  # in a sequence of nodes: a visit of the base
 
@@ -39,12 +43,17 @@ class Known(NamedTuple):
     turned: NDArray[np.bool_]  # which of the nodes are flown from their last points
 
 
-def first_plan(problem: TimedProblem, before: WarmState) -> Incumbent:
+def first_plan(problem: TimedProblem, before: WarmState,
+               most: int = NO_LIMIT) -> tuple[Incumbent, frozenset[int]]:
     """Routes without excess: the earlier ones, then all other tasks where each costs least.
 
     Args:
         problem: the current problem.
         before: the earlier plan; tasks that are gone, or come too late now, are left out of it.
+        most: places that are tried for tasks that may not be beside any neighbour.
+
+    Returns:
+        The routes, and the indices of tasks in none that were tried beside their neighbours only.
     """
     a, routes = problem.arrays, empty_timed_routes(problem.arrays)
     nodes, bounds, index = [], [0], problem.base.index
@@ -60,8 +69,10 @@ def first_plan(problem: TimedProblem, before: WarmState) -> Incumbent:
     known = Known(np.array(nodes, np.int64), np.array(bounds, np.int64),
                   np.array([node in turned for node in nodes], np.bool_))
     best = empty_incumbent(a)
-    fill_routes(a, routes, known, tasks, problem.prizes, best, rng_state(0))
-    return best
+    first = fill_routes(a, routes, known, tasks, problem.prizes, most, best, rng_state(0))
+    untried = tasks[first:]
+    absent = untried[best.order[untried] == untried] - a.uavs
+    return best, frozenset(absent.tolist())
 
 
 def completed(problem: TimedProblem, best: Incumbent) -> Incumbent:
@@ -72,7 +83,8 @@ def completed(problem: TimedProblem, best: Incumbent) -> Incumbent:
     if absent.size and absent.size * tasks.size < MOST_PLACES:
         set_order(a, routes, best.order)
         absent = absent[np.argsort(-a.fixed[absent, at.WORTH], kind='stable')]
-        fill_routes(a, routes, no_routes(a), absent, problem.prizes, found, rng_state(0))
+        fill_routes(a, routes, no_routes(a), absent, problem.prizes, NO_LIMIT, found,
+                    rng_state(0))
     return found
 
 
@@ -82,15 +94,17 @@ def no_routes(a: TimedArrays) -> Known:
 
 
 @kernel
-def fill_routes(a: TimedArrays, r: TimedRoutes, known: Known, tasks: Ints, prizes: bool,
-                best: Incumbent, rng: RngState) -> None:
+def fill_routes(a: TimedArrays, r: TimedRoutes, known: Known, tasks: Ints, prizes: bool, most: int,
+                best: Incumbent, rng: RngState) -> int:
     """Append known routes, insert task nodes where each costs least, keep what is better.
 
-    best: overwritten where the routes are better. One kernel: they compile faster together.
+    most: see `insert_in_order`, which returns the same; best: overwritten where the routes are
+    better. One kernel: they compile faster together.
     """
     _append_all(a, r, known)
-    insert_in_order(a, r, tasks, prizes, rng)
+    limited = insert_in_order(a, r, tasks, prizes, most, rng)
     record(a, r, best, prizes)
+    return limited
 
 
 @inline_kernel
