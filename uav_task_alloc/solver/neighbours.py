@@ -20,11 +20,16 @@ _NOISE = 4096  # random numbers drawn once; each task reads them from a random o
 
 
 @inner_allocating_kernel
-def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, float]:
-    """Points (n, 3) sorted into square cells, O(n).
+def sort_into_cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, float]:
+    """Sort points into square cells in plan view. O(n)
 
-    Returns the cell of each point (n), the first index of each cell in the order, with one more
-    entry for the end, the order (n), and the side of a cell [m].
+    Args:
+        xyz: float64 (n, 3) [m], at least one.
+        per_cell: points in a cell, about.
+
+    Returns:
+        The cell of each point (n), the first index of each cell in the order, with one more entry
+        for the end, the order (n), and the side of a cell [m].
     """
     n = len(xyz)
     x0, y0 = xyz[0, 0], xyz[0, 1]
@@ -83,7 +88,7 @@ def find_nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
     squares = np.empty((n, k))
     if k == 0:
         return squares
-    cell, first, order, side = _cells(xyz, 3.0)
+    cell, first, order, side = sort_into_cells(xyz, 3.0)
     across = int(math.sqrt(first.size - 1) + 0.5)
     held = np.empty(k, np.int64)
     for i in range(n):

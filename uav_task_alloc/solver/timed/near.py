@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from uav_task_alloc.geometry.outline import Floats, Ints
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import allocating_kernel, inline_kernel, inner_allocating_kernel
+from uav_task_alloc.solver.neighbours import sort_into_cells
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import Links, TimedArrays
 from uav_task_alloc.solver.timed.ways import nearest_ends
@@ -24,6 +25,15 @@ class KnownNear(NamedTuple):
     then: Ints  # (n) index of each present task in the earlier problem; -1: new
     now: Ints  # index of each earlier task in the present problem; -1: gone
     fresh: Ints  # indices of the new tasks
+
+
+class TaskCells(NamedTuple):
+    """Ends of tasks sorted into square cells, as `sort_into_cells` returns them."""
+
+    cell: Ints  # of each end
+    first: Ints  # index in `order` of the first end of each cell, and the end
+    order: Ints  # ends by cell
+    side: float  # [m] of a cell
 
 
 def known_near(a: TimedArrays, earlier: TimedArrays | None, then: Ints) -> KnownNear:
@@ -59,17 +69,29 @@ def _may_be_adjacent(a: TimedArrays, t: int, s: int, least: float) -> bool:
 
 
 @inline_kernel
-def _add_neighbour(a: TimedArrays, i: int, kept: int, j: int, pace: float) -> int:
-    """Add task j to the first `kept` neighbours of task i, nearest first; how many now. O(k)."""
+def _comes_after(a: TimedArrays, i: int, m: int, metres: float, rank: int) -> bool:
+    """Whether the m-th neighbour of task i comes after one at a distance, of two as near the one
+    of greater rank. O(1).
+    """
+    return bool(a.near_length[i, m] > metres
+                or (a.near_length[i, m] == metres and a.near[i, m] > rank))
+
+
+@inline_kernel
+def _add_neighbour(a: TimedArrays, i: int, kept: int, j: int, rank: int, pace: float) -> int:
+    """Add task j to the first `kept` neighbours of task i, nearest first; how many now. O(k).
+
+    rank: of two that are as near the one with the smaller node is first, of j with this one.
+    """
     t, s, k = a.uavs + i, a.uavs + j, a.near.shape[1]
     square, flat = nearest_ends(a, t, s)
     metres = math.sqrt(square)
-    if i == j or k == 0 or (kept == k and metres >= a.near_length[i, k - 1]):
+    if i == j or k == 0 or (kept == k and not _comes_after(a, i, k - 1, metres, rank)):
         return kept
     if not _may_be_adjacent(a, t, s, math.sqrt(flat) * pace):
         return kept
     place = min(kept, k - 1)
-    while place > 0 and a.near_length[i, place - 1] > metres:
+    while place > 0 and _comes_after(a, i, place - 1, metres, rank):
         a.near_length[i, place] = a.near_length[i, place - 1]
         a.near[i, place] = a.near[i, place - 1]
         place -= 1
@@ -77,21 +99,26 @@ def _add_neighbour(a: TimedArrays, i: int, kept: int, j: int, pace: float) -> in
     return int(min(kept + 1, k))
 
 
-@kernel
-def fill_near(a: TimedArrays, known: KnownNear, pace: float, squares: Floats) -> None:
-    """Fill all neighbours of `a`. O(n (k + classes)) where known, else O(n (n + classes)).
+@allocating_kernel
+def fill_near(a: TimedArrays, known: KnownNear, pace: float, xyz: Floats,
+              squares: Floats) -> None:
+    """Fill all neighbours of `a`. About O(n (k + classes)).
 
     known: neighbours of an earlier problem; pace: [s/m] of the fastest UAV, horizontally;
+    xyz: [m] where tasks begin, (n, 3), and where they end, (2 n, 3) if any has a path;
     squares: (c) scratch.
     """
-    _fill_near_tasks(a, known, pace)
+    _fill_near_tasks(a, known, pace, xyz)
     _fill_near_classes(a, squares)
 
 
-@inline_kernel
-def _fill_near_tasks(a: TimedArrays, known: KnownNear, pace: float) -> None:
-    """Fill a.near, a.near_length and a.near_count. O(n k) where known, else O(n^2)."""
-    n = len(a.near)
+@inner_allocating_kernel
+def _fill_near_tasks(a: TimedArrays, known: KnownNear, pace: float, xyz: Floats) -> None:
+    """Fill a.near, a.near_length and a.near_count. O(n k), more where windows exclude many."""
+    n, last, seen = len(a.near), 1 << 62, np.empty(len(a.near), np.int64)
+    cells = TaskCells(*sort_into_cells(xyz, 3.0))
+    for i in range(n):
+        seen[i] = -1
     for i in range(n):
         kept, before = 0, known.then[i]
         if before >= 0:
@@ -101,12 +128,38 @@ def _fill_near_tasks(a: TimedArrays, known: KnownNear, pace: float) -> None:
                     a.near[i, kept], a.near_length[i, kept] = a.uavs + j, known.lengths[before, m]
                     kept += 1
             for m in range(known.fresh.size):
-                kept = _add_neighbour(a, i, kept, known.fresh[m], pace)
+                kept = _add_neighbour(a, i, kept, known.fresh[m], last, pace)
         if before < 0 or kept < known.counts[before] // 2:
-            kept = 0
-            for j in range(n):
-                kept = _add_neighbour(a, i, kept, j, pace)
+            kept = _nearest_by_cells(a, i, pace, cells, seen)
         a.near_count[i] = kept
+
+
+@inline_kernel
+def _nearest_by_cells(a: TimedArrays, i: int, pace: float, cells: TaskCells, seen: Ints) -> int:
+    """Write the neighbours of task i, from cells around its ends outwards; returns their number.
+
+    seen: (n) tasks before i at most; is changed.
+    """
+    n, k, kept, ring = len(a.near), a.near.shape[1], 0, 0
+    across = int(math.sqrt(cells.first.size - 1) + 0.5)
+    while ring < across and k > 0:
+        if kept == k and a.near_length[i, k - 1] < (ring - 1) * cells.side:
+            break
+        for end in range(i, cells.cell.size, n):
+            row, column = cells.cell[end] // across, cells.cell[end] % across
+            for y in range(max(0, row - ring), min(across, row + ring + 1)):
+                step = 1 if abs(y - row) == ring or ring == 0 else 2 * ring
+                for x in range(column - ring, column + ring + 1, step):
+                    if x < 0 or x >= across:
+                        continue
+                    at_cell = y * across + x
+                    for m in range(cells.first[at_cell], cells.first[at_cell + 1]):
+                        j = cells.order[m] % n
+                        if seen[j] != i:
+                            seen[j] = i
+                            kept = _add_neighbour(a, i, kept, j, a.uavs + j, pace)
+        ring += 1
+    return kept
 
 
 @inline_kernel

@@ -141,8 +141,10 @@ def _fill(problem: Problem, a: TimedArrays, known: TimedProblem | None) -> float
     pace = float(a.pace[:, 0].min())
     index = known.base.index if known else {}
     then = np.array([index.get(task.id, -1) for task in problem.tasks], np.int64)
+    ends = np.array([[task.position for task in problem.tasks],
+                     [task.end for task in problem.tasks]][:1 + (a.paths.ndim == 2)])
     fill_near(a, known_near(a, known.arrays if known else None, then), pace,
-              np.empty(max(1, a.near_class.shape[1])))
+              ends.reshape(-1, 3), np.empty(max(1, a.near_class.shape[1])))
     some = a.near_count > 0
     legs = a.near_length[some, 0] if some.any() else a.fixed[a.uavs:a.ends, at.REMOTE]
     metres = max(float(legs.mean()), 1e-6)
