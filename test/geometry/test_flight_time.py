@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from uav_task_alloc.geometry.flight_time import flight_time, path_time, straight_time
-from uav_task_alloc.model import Uav
+from uav_task_alloc.geometry.flight_time import (
+    flight_time,
+    path_time,
+    service_seconds,
+    straight_time,
+)
+from uav_task_alloc.model import Task, Uav
 
 UAV = Uav('u', (0.0, 0.0, 0.0), cruise_speed=10.0, climb_speed=2.0, descent_speed=1.0)
 
@@ -29,6 +34,14 @@ def test_the_parts_of_a_path_add_up_each_with_its_slowest_axis():
     over = [(0.0, 0.0, 0.0), (10.0, 0.0, 20.0), (110.0, 0.0, 20.0), (120.0, 0.0, 0.0)]
     assert flight_time(UAV, over) == pytest.approx(10.0 + 10.0 + 20.0)
     assert flight_time(UAV, over[:1]) == flight_time(UAV, []) == 0.0
+
+
+def test_the_service_of_a_turned_path_is_that_of_the_task_flown_so():
+    path = ((0.0, 0.0, 0.0), (10.0, 0.0, 20.0), (110.0, 30.0, 25.0))
+    task = Task('t', path[0], service_time=3.0, path=path)
+    assert service_seconds(UAV, task) == pytest.approx(3.0 + 10.0 + 10.44, abs=0.01)
+    assert service_seconds(UAV, task, turned=True) == service_seconds(UAV, task.turned)
+    assert service_seconds(UAV, task.turned, turned=True) == service_seconds(UAV, task)
 
 
 def test_the_kernel_computes_the_same():

@@ -60,12 +60,13 @@ def flight_time(uav: Uav, points: Sequence[Point]) -> float:
                for (x, y, z), (x1, y1, z1) in pairwise(points))
 
 
-def service_seconds(uav: Uav, task: Task) -> float:
+def service_seconds(uav: Uav, task: Task, turned: bool = False) -> float:
     """Time that a UAV needs for the service of a task, with the flight along its path.
 
     Args:
         uav: its cruise, climb and descent speed count.
         task: flown from its position; an action `speed` replaces the cruise speed along the path.
+        turned: its path is flown from the last point instead.
 
     Returns:
         [s].
@@ -76,4 +77,4 @@ def service_seconds(uav: Uav, task: Task) -> float:
                   uav.cruise_speed)
     return task.stay + sum(
         straight_time(x1 - x, y1 - y, z1 - z, cruise, uav.climb_speed, uav.descent_speed)
-        for (x, y, z), (x1, y1, z1) in pairwise(task.path))
+        for (x, y, z), (x1, y1, z1) in pairwise(task.path[::-1] if turned else task.path))

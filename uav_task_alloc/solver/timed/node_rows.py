@@ -11,7 +11,7 @@ import numpy as np
 
 from uav_task_alloc.geometry.flight_time import service_seconds
 from uav_task_alloc.geometry.outline import Floats, Ints
-from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.model import Uav
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import aligned_zeros
@@ -60,7 +60,7 @@ def ways_of_tasks(problem: Problem, nodes: int,
     lengths = np.array([task.path_length if task.path else 0.0 for task in tasks], np.float64)
     if not with_path:
         return far, lengths, np.empty((len(classes), 0))
-    along = [[service_seconds(fleet, each) for task in tasks for each in (task, task.turned)]
+    along = [[service_seconds(fleet, task, turned) for task in tasks for turned in (False, True)]
              for fleet in _one_of_each(problem.uavs, classes)]
     return far, lengths, np.array(along, np.float64).reshape(len(classes), 2 * len(tasks))
 
@@ -81,7 +81,7 @@ def total_value(problem: Problem) -> float:
 
 
 def fixed_rows(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]],
-               total: float) -> Floats:
+               total: float, along: Floats) -> Floats:
     """Return (nodes, FIXED) what is known of each node.
 
     Args:
@@ -89,6 +89,7 @@ def fixed_rows(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str
         visits: base visits of a UAV at most.
         aboard: ids of the tasks whose payload UAVs in the air have on board, by UAV id.
         total: value of all tasks.
+        along: TimedArrays.along.
     """
     uavs, tasks = problem.uavs, problem.tasks
     m, n, goal = len(uavs), len(tasks), problem.rules.objective
@@ -102,8 +103,8 @@ def fixed_rows(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str
     loaded = {name for names in aboard.values() for name in names}
     values = np.fromiter(chain.from_iterable(map(_TASK_NUMBERS, tasks)), np.float64,
                          6 * n).reshape(n, 6)
-    rows[:, at.SERVICE] = [_least_service(uavs, task) if task.path or task.actions
-                           else task.service_time for task in tasks]
+    rows[:, at.SERVICE] = along.reshape(len(along), n, 2).min(axis=(0, 2)) if along.size else [
+        task.stay if task.actions else task.service_time for task in tasks]
     latest = at.CLOSES if hard else at.DUE
     rows[:, [at.OPENS, latest, at.LOAD, at.WORTH, at.ANNOUNCED]] = values[:, :5]
     rows[:, at.WEIGHT] = goal.response * rows[:, at.WORTH] / total
@@ -119,9 +120,3 @@ def fixed_rows(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str
     bases[:, at.CLOSES] = np.repeat(until, visits)
     bases[:, at.SERVICE] = np.repeat([uav.turnaround for uav in uavs], visits)
     return fixed
-
-
-def _least_service(uavs: Sequence[Uav], task: Task) -> float:
-    """Shortest service [s], with the flight along the path in either direction."""
-    return min((service_seconds(uav, each) for uav in uavs for each in (task, task.turned)),
-               default=0.0) if task.path else task.stay

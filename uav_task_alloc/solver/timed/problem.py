@@ -77,7 +77,6 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
     held = [after_locked(problem, u, aboard, total) for u in range(m)]
     begin = np.array([each.begin for each in held]).reshape(m, at.BEGIN_COLUMNS)
     limit = trip_limits(problem, visits, begin, np.array([each.load for each in held]))
-    fixed = fixed_rows(problem, visits, aboard, total)
     class_of = classes_of_uavs(problem, begin, limit, aboard)
     order = np.argsort(class_of, kind='stable')
     classes = int(class_of.max(initial=-1)) + 1
@@ -86,6 +85,7 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
     paths = np.empty((0, 0) if any(task.path for task in tasks) else 0, np.bool_)
     nodes = len(points_of_nodes(problem, visits))
     far, way_length, along = ways_of_tasks(problem, nodes, classes_of_speeds)
+    fixed = fixed_rows(problem, visits, aboard, total, along)
     arrays = TimedArrays(
         m, m + n, 2 * m + n, visits, rules.returns, not problem.distances.zones,
         is_flat(problem), _counts_time(problem), _is_whole(problem, visits), rules.grain,
