@@ -14,6 +14,7 @@ from uav_task_alloc.work.zone_sections import PlaneRing, Span
 
 PlaneCell = list[XY]  # [m] corners of a convex polygon
 _THIN = 1e-7  # [m] slabs that are thinner have no cells
+_ROUNDING, _ROWS = 1e-6, 256  # [m] around boxes of edges; edges compared with all at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,7 @@ def turn(points: Iterable[XY], angle: float) -> list[XY]:
 
 
 def crossings(rings: Sequence[PlaneRing]) -> list[XY]:
-    """The points in which edges of rings cross; O(edges^2), vectorised.
+    """The points in which edges of rings cross; O(edges^2) tests of their boxes, vectorised.
 
     Args:
         rings: [m].
@@ -60,18 +61,23 @@ def crossings(rings: Sequence[PlaneRing]) -> list[XY]:
     Returns:
         Without common corners of neighbouring edges.
     """
-    pairs = np.array([(a, b) for ring in rings for a, b in edges(ring)])
+    ends = np.array([(a, b) for ring in rings for a, b in edges(ring)]).reshape(-1, 2, 2)
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    (west, south), (east, north) = ends.min(axis=1).T - _ROUNDING, ends.max(axis=1).T + _ROUNDING
     found: list[XY] = []
-    for i in range(len(pairs) - 1):
-        p, d = pairs[i, 0], pairs[i, 1] - pairs[i, 0]
-        q, e = pairs[i + 1:, 0], pairs[i + 1:, 1] - pairs[i + 1:, 0]
-        cross = d[0] * e[:, 1] - d[1] * e[:, 0]
-        near = np.abs(cross) > 1e-12
-        q, e, cross = q[near], e[near], cross[near]
-        t = ((q[:, 0] - p[0]) * e[:, 1] - (q[:, 1] - p[1]) * e[:, 0]) / cross
-        u = ((q[:, 0] - p[0]) * d[1] - (q[:, 1] - p[1]) * d[0]) / cross
-        found += [(float(p[0] + s * d[0]), float(p[1] + s * d[1]))
-                  for s in t[(t > 0.0) & (t < 1.0) & (u > 0.0) & (u < 1.0)]]
+    for first in range(0, len(ends), _ROWS):
+        rows = slice(first, first + _ROWS)
+        i, j = np.nonzero((west <= east[rows, None]) & (east >= west[rows, None])
+                          & (south <= north[rows, None]) & (north >= south[rows, None]))
+        i, j = i[j > i + first] + first, j[j > i + first]
+        (px, py), (dx, dy), (qx, qy), (ex, ey) = start[i].T, along[i].T, start[j].T, along[j].T
+        cross = dx * ey - dy * ex
+        with np.errstate(divide='ignore', invalid='ignore'):
+            t = ((qx - px) * ey - (qy - py) * ex) / cross
+            u = ((qx - px) * dy - (qy - py) * dx) / cross
+        inside = (np.abs(cross) > 1e-12) & (t > 0.0) & (t < 1.0) & (u > 0.0) & (u < 1.0)
+        i, t = i[inside], t[inside, None]
+        found += map(tuple, (start[i] + t * along[i]).tolist())
     return found
 
 
