@@ -188,3 +188,34 @@ def test_in_a_quiet_world_no_list_changes_for_less_than_the_margin(margin):
             weak.append((before, now))
     assert (weak, searches) == ([], 60)
     assert changes < 12
+
+
+def test_many_changes_are_compared_without_the_times_of_all_uavs_for_each():
+    count, calls = 30, [0]
+    driver = AllocatorDriver(objective='response', replan_margin=0.0)
+    for k in range(count):
+        driver.uav(f'u{k}', 0.0, 1000.0 * k, 50.0)
+    driver.add(*((f'{side}{k}', x, 1000 * k) for k in range(count)
+                 for side, x in (('near', 50), ('far', -500))))
+    problem = driver.begin()
+    place = {task.id: task for task in problem.tasks}
+
+    def flown(first, then):
+        made = as_plan(problem.uavs, place, (), {
+            f'u{k}': (f'{first}{k}', f'{then}{k}') for k in range(count)})
+        lengths = {uav: np.cumsum([leg.length for leg in made.legs[uav]]) for uav in made.routes}
+        starts = {task: seconds for uav, row in made.routes.items()
+                  for task, seconds in zip(row, lengths[uav].tolist(), strict=True)}
+        ends = {uav: starts[row[-1]] for uav, row in made.routes.items()}
+
+        def times():
+            calls[0] += 1
+            return Timetable(starts, starts, {u: (row,) for u, row in made.routes.items()},
+                             ends=ends)
+        return replace(made, timetable=times)
+    before, best = flown('far', 'near'), flown('near', 'far')
+    chosen = accepted_plan(ReplanAnswer(problem, before, best), 0.0)
+    assert chosen.routes == best.routes
+    assert calls[0] <= 4
+    assert chosen.timetable().starts == best.timetable().starts
+    assert chosen.timetable().ends == best.timetable().ends

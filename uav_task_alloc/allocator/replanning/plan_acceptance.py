@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.model import Plan
@@ -14,6 +14,8 @@ from uav_task_alloc.objective import response_time
 from uav_task_alloc.timetable import Timetable
 
 TaskIdsByUav = dict[str, tuple[str, ...]]
+# fields of Timetable by task id, and by UAV id
+_OF_TASKS, _OF_UAVS = ('arrivals', 'starts', 'late'), ('trips', 'departures', 'ends')
 
 
 def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
@@ -35,11 +37,12 @@ def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
     repaired, best = answer.repaired, answer.best
     if best.penalty < repaired.penalty:
         return best
-    accepted, first, more = set[str](), _cost(answer, ()), False
+    costs = _CombinedCosts(answer)
+    accepted, first, more = set[str](), costs.of(()), False
     cost = first
     for group in exchange_groups(repaired.routes, best.routes, repaired.reversed ^ best.reversed):
-        value, now = _added_value(answer, group), _cost(answer, accepted | group)
-        before = _cost(answer, (), group)
+        value, now = costs.added_value(group), costs.of(accepted | group)
+        before = costs.of((), group)
         if value > 0.0 or (value == 0.0 and cost - now > max(margin * before, 1e-6)):
             accepted |= group
             cost, more = now, more or value > 0.0
@@ -52,22 +55,66 @@ def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
     return replace(chosen, cost=cost + answer.problem.objective.response * waited)
 
 
-def _added_value(answer: ReplanAnswer, group: Collection[str]) -> float:
-    """Value that the best plan serves more with a group of UAVs than the repaired one."""
-    value = {task.id: task.value for task in answer.problem.tasks}
-    # fsum: the same tasks have the same sum in any order
-    before, after = (math.fsum(value[task] for uav_id in group for task in plan.routes[uav_id])
-                     for plan in (answer.repaired, answer.best))
-    return after - before
+class _UavCost(NamedTuple):
+    """What the route of a UAV adds to the cost of a plan."""
+
+    metres: float  # with a penalty for what exceeds its range
+    end: float  # [s] of the route; -inf: it has no task
+    responses: list[float]  # value * start [s] of each task
+    late: list[float]  # [s] of each task that is late
 
 
-def _cost(answer: ReplanAnswer, changed: Collection[str],
-          only: Collection[str] | None = None) -> float:
-    """Cost of the objective of the repaired plan with the changed UAVs as in the best one.
+class _CombinedCosts:
+    """Costs of the objective of the repaired plan with some UAVs as in the best one.
 
-    only: UAVs that count; None: all.
+    Each is found by what single routes add: there may be as many groups as UAVs.
     """
-    return plan_cost(answer.problem, _combined(answer, changed), only)
+
+    def __init__(self, answer: ReplanAnswer) -> None:
+        self._answer, problem = answer, answer.problem
+        self._value = {task.id: task.value for task in problem.tasks}
+        self._total = math.fsum(self._value.values())
+        self._before, self._after = (_uav_costs(problem, plan)
+                                     for plan in (answer.repaired, answer.best))
+
+    def added_value(self, group: Collection[str]) -> float:
+        """Value that the best plan serves more with a group of UAVs than the repaired one."""
+        # fsum: the same tasks have the same sum in any order
+        before, after = (math.fsum(self._value[task] for uav_id in group
+                                   for task in plan.routes[uav_id])
+                         for plan in (self._answer.repaired, self._answer.best))
+        return after - before
+
+    def of(self, changed: Collection[str], only: Collection[str] | None = None) -> float:
+        """Return the cost with the changed UAVs as in the best plan; only: UAVs that count."""
+        return _cost_of(self._answer.problem, [
+            (self._after if uav_id in changed else self._before)[uav_id]
+            for uav_id in self._before if only is None or uav_id in only], self._total)
+
+
+def _uav_costs(problem: ReplanProblem, plan: Plan,
+               only: Collection[str] | None = None) -> dict[str, _UavCost]:
+    """What each UAV adds to the cost of a plan, in the order of the problem."""
+    paths = {task.id: task.path_length for task in problem.tasks}
+    value = {task.id: task.value for task in problem.tasks}
+    times = Timetable() if problem.objective.is_shortest else plan.timetable()
+    starts, late = times.starts, times.late
+    return {uav.id: _UavCost(
+        _length_with_penalty(plan, uav.id, uav.range, paths), times.ends.get(uav.id, -math.inf),
+        [value[task] * starts[task] for task in plan.routes.get(uav.id, ()) if task in starts],
+        [late[task] for task in plan.routes.get(uav.id, ()) if task in late])
+        for uav in problem.uavs if only is None or uav.id in only}
+
+
+def _cost_of(problem: ReplanProblem, costs: Collection[_UavCost], total: float) -> float:
+    """The cost of the objective of routes; total: value of all tasks."""
+    prices, metres = problem.objective, sum(each.metres for each in costs)
+    if prices.is_shortest:
+        return prices.cost(metres)
+    waits = math.fsum(chain.from_iterable(each.responses for each in costs))
+    ends = [each.end for each in costs if each.end > -math.inf]
+    return prices.cost(metres, max(ends, default=0.0), waits / total if total > 0.0 else 0.0,
+                       math.fsum(chain.from_iterable(each.late for each in costs)))
 
 
 def plan_cost(problem: ReplanProblem, plan: Plan, only: Collection[str] | None = None) -> float:
@@ -81,19 +128,8 @@ def plan_cost(problem: ReplanProblem, plan: Plan, only: Collection[str] | None =
     Returns:
         The cost, with a penalty for what exceeds ranges.
     """
-    prices = problem.objective
-    uavs = [uav for uav in problem.uavs if only is None or uav.id in only]
-    paths = {task.id: task.path_length for task in problem.tasks}
-    metres = sum(_length_with_penalty(plan, uav.id, uav.range, paths) for uav in uavs)
-    if prices.is_shortest:
-        return prices.cost(metres)
-    times, ids = plan.timetable(), {uav.id for uav in uavs}
-    mine = {task for uav_id in ids for task in plan.routes.get(uav_id, ())}
-    return prices.cost(
-        metres, max((end for uav_id, end in times.ends.items() if uav_id in ids), default=0.0),
-        response_time(problem.tasks, {task: start for task, start in times.starts.items()
-                                      if task in mine}, from_now=True),
-        math.fsum(late for task, late in times.late.items() if task in mine))
+    return _cost_of(problem, _uav_costs(problem, plan, only).values(),
+                    math.fsum(task.value for task in problem.tasks))
 
 
 def exchange_groups(before: Mapping[str, tuple[str, ...]],
@@ -145,30 +181,17 @@ def _combined(answer: ReplanAnswer, changed: Collection[str]) -> Plan:
 
 def _combined_times(answer: ReplanAnswer, changed: Collection[str]) -> Timetable:
     """The times of `_combined`."""
-    merged, best = Timetable(), answer.best
-    for plan in (answer.repaired, best):
+    merged: dict[str, dict[str, Any]] = {name: {} for name in (*_OF_TASKS, *_OF_UAVS)}
+    for plan in (answer.repaired, answer.best):
         times = plan.timetable()
-        for uav_id in plan.routes:
-            if (uav_id in changed) == (plan is best):
-                merged = _with_uav(merged, times, uav_id, plan.routes[uav_id])
-    return replace(merged, response=response_time(answer.problem.tasks, merged.starts))
-
-
-def _with_uav(merged: Timetable, times: Timetable, uav_id: str,
-              tasks: Iterable[str]) -> Timetable:
-    """The merged times, and those of one UAV."""
-    def joined(some: Mapping[str, Any], more: Mapping[str, Any],
-               keys: Iterable[str]) -> dict[str, Any]:
-        return {**some, **{key: more[key] for key in keys if key in more}}
-
-    row = list(tasks)
-    return replace(
-        merged, arrivals=joined(merged.arrivals, times.arrivals, row),
-        starts=joined(merged.starts, times.starts, row),
-        late=joined(merged.late, times.late, row),
-        trips=joined(merged.trips, times.trips, [uav_id]),
-        departures=joined(merged.departures, times.departures, [uav_id]),
-        ends=joined(merged.ends, times.ends, [uav_id]))
+        for uav_id, row in plan.routes.items():
+            if (uav_id in changed) != (plan is answer.best):
+                continue
+            for names, keys in ((_OF_TASKS, row), (_OF_UAVS, (uav_id,))):
+                for name in names:
+                    known = getattr(times, name)
+                    merged[name].update((key, known[key]) for key in keys if key in known)
+    return Timetable(**merged, response=response_time(answer.problem.tasks, merged['starts']))
 
 
 def repaired_routes(routes: Mapping[str, Iterable[str]], locked: Mapping[str, tuple[str, ...]],
