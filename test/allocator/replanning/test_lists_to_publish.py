@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from allocation import AllocatorDriver
 
-from uav_task_alloc.allocator.replanning.built_lists import BuiltLists
+from uav_task_alloc.allocator.replanning.built_lists import BuiltLists, build_lists
+from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
 from uav_task_alloc.allocator.replanning.lists_to_publish import (
     holding_plan,
     lists_apart,
@@ -50,3 +51,17 @@ def test_the_first_plan_that_holds_the_deadlines_is_chosen(driver):
 def test_without_separation_lists_stay_as_they_are(driver):
     built = BuiltLists(dict(driver.world.lists_in_force()))
     assert lists_apart(driver.world, built, driver.now) is built
+
+
+def test_lists_that_break_no_deadline_are_not_checked_for_what_must_change(driver, monkeypatch):
+    checked = []
+    monkeypatch.setattr(type(driver.world), 'must_change',
+                        lambda _, uav_id: bool(checked.append(uav_id)))
+    lists = build_lists(driver.world, KEEPS, driver.now).lists
+    checked.clear()
+    assert held_lists(driver.world, lists, driver.now) == (lists, {})
+    assert checked == []
+    lists = build_lists(driver.world, BREAKS, driver.now).lists
+    checked.clear()
+    held_lists(driver.world, lists, driver.now)
+    assert checked

@@ -34,11 +34,12 @@ def held_lists(world: World, new: Mapping[str, UavList],
     """
     old = lists_from_now(world, new, stamp)
     kept = {name: (uav_id, start) for uav_id, each in old.items()
-            if not world.must_change(uav_id)
             for name, start in promised_starts(each, stamp).items() if world.tasks.is_open(name)}
     after = {stop.task.id: stamp + stop.start for each in new.values() for stop in each.stops}
     broken = [name for name, (uav_id, start) in kept.items()
-              if after.get(name, math.inf) > max(start + _ROUNDING, _latest(old[uav_id], name))]
+              if after.get(name, math.inf) > start + _ROUNDING
+              and after.get(name, math.inf) > _latest(old[uav_id], name)
+              and not world.must_change(uav_id)]
     lists, reasons = dict(new), dict[str, str]()
     for group in exchange_groups(_routes(old), _routes(new)) if broken else ():
         names = sorted(name for name in broken if kept[name][0] in group)

@@ -75,9 +75,12 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
     stops: list[ListStop] = []
     unreachable: dict[str, str] = {}
     before, place, velocity = _START, uav.position, flight.velocity if flight else None
+    known = _published_stops(published)
     for task in tasks:
         new = ListStop(task, Leg((), 0.0), 0.0, reversed=task.id in backward)
-        old = _published_stop(published, before, new)
+        previous, old = known.get(task.id, ('', None))
+        if old is not None and (previous != before or old.way != new.way):
+            old = None
         leg = _steady_leg(old, before == _START, place, paths, _planned_leg(
             legs, _leg_key(uav.id, before, task.id), place, new.entry, paths), keep, velocity)
         if leg is None or not paths.clear(*new.way):
@@ -140,10 +143,8 @@ def _steady_leg(stop: ListStop | None, first: bool, place: Point, paths: SafePat
     return fresh if shorter else Leg(old.via, metres)
 
 
-def _published_stop(published: UavList, before: str, new: ListStop) -> ListStop | None:
-    previous = _START
-    for stop in published.stops:
-        if stop.task.id == new.task.id:
-            return stop if previous == before and stop.way == new.way else None
-        previous = stop.task.id
-    return None
+def _published_stops(published: UavList) -> dict[str, tuple[str, ListStop | None]]:
+    """The stops of a list by task id, each with the id of the task before it."""
+    befores = (_START, *published.task_ids)
+    return {stop.task.id: (before, stop) for before, stop in zip(befores, published.stops,
+                                                                 strict=False)}
