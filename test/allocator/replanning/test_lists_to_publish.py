@@ -6,7 +6,7 @@ import pytest
 from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.replanning.built_lists import BuiltLists, build_lists
-from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
+from uav_task_alloc.allocator.replanning.held_deadlines import held_lists, relaxed_tasks
 from uav_task_alloc.allocator.replanning.lists_to_publish import (
     holding_plan,
     lists_apart,
@@ -65,3 +65,18 @@ def test_lists_that_break_no_deadline_are_not_checked_for_what_must_change(drive
     checked.clear()
     held_lists(driver.world, lists, driver.now)
     assert checked
+
+
+def test_the_times_of_lists_without_deadlines_are_not_computed_for_them(monkeypatch):
+    driver = AllocatorDriver(default_cruise_speed=10.0)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(Task('near', (100.0, 0.0, 50.0)), Task('far', (-2000.0, 0.0, 50.0)))
+    driver.settle()
+    asked = []
+    monkeypatch.setattr(type(driver.world.lists), 'restamped',
+                        lambda _, uav_id, *times: asked.append(uav_id))
+    tasks = driver.world.tasks_to_plan()
+    assert relaxed_tasks(driver.world, tasks, ['a'], driver.now) == tasks
+    lists = dict(driver.world.lists_in_force())
+    assert held_lists(driver.world, lists, driver.now) == (lists, {})
+    assert asked == []

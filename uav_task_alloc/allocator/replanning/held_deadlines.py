@@ -32,6 +32,8 @@ def held_lists(world: World, new: Mapping[str, UavList],
         are in no list for that, by task id. A list that cannot or may not be flown any more keeps
         no deadline.
     """
+    if not any(map(_has_deadlines, map(world.list_of, new))):
+        return dict(new), {}
     old = lists_from_now(world, new, stamp)
     kept = {name: (uav_id, start) for uav_id, each in old.items()
             for name, start in promised_starts(each, stamp).items() if world.tasks.is_open(name)}
@@ -96,11 +98,16 @@ def relaxed_tasks(world: World, tasks: Iterable[Task], uav_ids: Iterable[str],
     Returns:
         The same tasks; one that its list may still keep is late only after that list's start.
     """
-    starts = {name: start for each in lists_from_now(world, uav_ids, stamp).values()
+    with_deadlines = [uav_id for uav_id in uav_ids if _has_deadlines(world.list_of(uav_id))]
+    starts = {name: start for each in lists_from_now(world, with_deadlines, stamp).values()
               for name, start in promised_starts(each, stamp).items()}
     return tuple(replace(task, latest=starts[task.id] + _ROUNDING)
                  if starts.get(task.id, -math.inf) + _ROUNDING > task.latest else task
                  for task in tasks)
+
+
+def _has_deadlines(each: UavList) -> bool:
+    return any(stop.task.latest < math.inf for stop in each.stops)
 
 
 def _latest(each: UavList, name: str) -> float:
