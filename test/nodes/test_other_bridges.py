@@ -7,13 +7,17 @@ import pytest
 import rclpy
 from conftest import Probe
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from pymavlink.dialects.v20 import ardupilotmega as d
 from test_bridge_findings import HEARTBEAT, Bridge as WholeBridge, fact
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.nodes.conversions.messages import STATES
+from uav_task_alloc.nodes.conversions.messages import LATCHED, STATES
 from uav_task_alloc.nodes.ros.other_bridges import SETTLING_TIME, OtherBridges
 
 pytestmark = pytest.mark.ros
+ARMED = d.MAVLink_heartbeat_message(
+    d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, d.MAV_MODE_FLAG_SAFETY_ARMED, 4 << 16 | 4 << 24,
+    4, 3)
 
 
 class Bridge(Probe):
@@ -81,6 +85,53 @@ def test_a_bridge_whose_uavs_another_node_reports_starts_none_and_says_so(whole,
     whole.until(lambda: [session.executor.policy.grounded for session in list(
         whole.node.ground_station.sessions.values())] == [reason])
     whole.until(lambda: not whole.node.grounded())  # it has ended
+
+
+def test_while_its_id_is_shared_a_uav_holds_gets_no_lists_and_is_not_available(whole, probe):
+    states = probe.node.create_publisher(m.UavState, 'uav_states', STATES)
+    seen = probe.collect(m.UavState, 'uav_states', STATES)
+    lists = probe.node.create_publisher(m.TaskList, 'uav_1/task_list', LATCHED)
+    msg, clock = m.UavState(uav_id='uav_1'), itertools.count(1000, 50)
+
+    def fly():
+        whole.send(ARMED, d.MAVLink_global_position_int_message(
+            next(clock), 473977420, 85455940, 500000, 10000, 0, 0, 0, 0),
+            d.MAVLink_extended_sys_state_message(0, d.MAV_LANDED_STATE_IN_AIR))
+        probe.executor.spin_once(timeout_sec=0.0)
+
+    def shared(until):
+        def step():
+            fly()
+            msg.header.stamp.sec += 1
+            states.publish(msg)
+            return whole.node.others.shared('uav_1', time.monotonic()) and until()
+        whole.until(step)
+
+    shared(lambda: True)
+    session, = whole.node.ground_station.sessions.values()
+    lists.publish(m.TaskList(uav_id='uav_1', revision=1))
+    shared(lambda: 'uav_1' in whole.node.lists.pending)
+    reason = whole.node.others.shared('uav_1', time.monotonic())
+    assert reason.startswith('another node reports uav_1, too (states are published by /mavlink_')
+    assert probe.node.get_name() in reason
+    shared(lambda: any(each.reason == reason and not each.available for each in seen))
+    shared(lambda: session.executor.holds.for_shared_id)
+    assert session.executor.onboard.tasks is None
+    whole.until(lambda: fly() or session.executor.onboard.tasks is not None)  # it has ended
+    whole.until(lambda: not session.executor.holds.for_shared_id)
+
+
+def test_a_single_report_of_another_node_holds_no_uav(domain):
+    one = Bridge('/four', 0)
+    one.others.note_own(m.UavState(uav_id='uav_1'))
+    for second in range(1, 4):
+        assert one.others.shared('uav_1', time.monotonic()) == ''
+        msg = m.UavState(uav_id='uav_1')
+        msg.header.stamp.sec = second
+        one.others._on_state(msg)
+    assert one.others.shared('uav_1', time.monotonic()) == 'another node reports uav_1, too'
+    assert one.others.shared('uav_2', time.monotonic()) == ''
+    one.close()
 
 
 def test_two_bridges_with_the_same_uav_find_each_other(bridge):

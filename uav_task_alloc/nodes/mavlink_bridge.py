@@ -21,6 +21,7 @@ from uav_task_alloc.mavlink.gcs.fence_store import FenceFileStore
 from uav_task_alloc.mavlink.gcs.ground_station import GroundStation, VehicleSession
 from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
+from uav_task_alloc.mavlink.gcs.shared_id import hold_where_shared
 from uav_task_alloc.mavlink.gcs.status import PublishedStates, state_of
 from uav_task_alloc.mavlink.gcs.telemetry_messages import WANTED
 from uav_task_alloc.mavlink.mission.items import TaskList
@@ -166,7 +167,7 @@ class MavlinkBridge(Node):
         with self.lock:
             status = state_of(session, now)
         measured_at = session.executor.telemetry.position_at
-        if conflict := self.origins.conflict():
+        if conflict := self.origins.conflict() or self.others.shared(session.uav_id, now):
             status = replace(status, available=False, reason=conflict)
         if self.published.is_due(status, measured_at, now, self.live.now.state_rate):
             with self.lock:
@@ -212,6 +213,7 @@ class MavlinkBridge(Node):
         self.report.log_search(time.monotonic())
         self.holds.step()
         self.assign_lists()
+        self.hold_shared()
 
     def grounded(self) -> str:
         """What a UAV on the ground waits for before a take-off; '' where it waits for nothing."""
@@ -231,14 +233,23 @@ class MavlinkBridge(Node):
                                        self.live.now.acceptance_radius)
 
     def assign_lists(self) -> None:
-        """Fly the waiting lists, once all origins are known and agree."""
+        """Fly the waiting lists, once all origins are known and agree, and ids are not shared."""
         if (not self.lists.pending or self.exiting() or self.origins.conflict()
                 or not self.origins.settled()):
             return
-        for uav_id, tasks in self.lists.take().items():
+        now = time.monotonic()
+        for uav_id, tasks in self.lists.take(
+                lambda uav_id: self.others.shared(uav_id, now)).items():
             with self.lock:
                 out = self.ground_station.assign(uav_id, tasks, time.monotonic())
             self.connections.send(out)
+
+    def hold_shared(self) -> None:
+        """Hold UAVs in flight that another node reports, too; the lists of before come first."""
+        with self.lock:
+            now = time.monotonic()
+            for session in self.ground_station.sessions.values():
+                hold_where_shared(session.executor, self.others.shared(session.uav_id, now), now)
 
     def on_hold(self, uav_id: str, request: HoldRequest) -> None:
         """Hold a UAV, or end a hold."""

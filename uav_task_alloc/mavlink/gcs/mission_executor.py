@@ -116,9 +116,9 @@ class MissionExecutor:
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
             self.holds.hold, self._end_of_list.stop_return, transfers.upload, transfers.read,
             self._has_list, transfers.resume, self._may_act, self._hold_first,
-            self._end_of_list.held_too_long, self.holds.stay, self._end_of_list.empty,
-            self._end_of_list.given_up, self.fence.clear_way, execution.update_mission,
-            takeoff.take_off, execution.fly)
+            self._end_of_list.held_too_long, self._settled, self.holds.stay,
+            self._end_of_list.empty, self._end_of_list.given_up, self.fence.clear_way,
+            execution.update_mission, takeoff.take_off, execution.fly)
 
     @property
     def going_home(self) -> bool:
@@ -330,3 +330,8 @@ class MissionExecutor:
             authority.hold = HoldStage.NO
             return []
         return [] if self.sender.backing_off(now) else self.sender.set_mode(ModeFunction.HOLD, now)
+
+    def _settled(self, now: float) -> NextMessages:
+        """In the air, fly no list before another node that reports its UAV would be found."""
+        settling = self.policy.settling
+        return self.sender.wait_for(settling) if settling and self.telemetry.airborne else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Holds a vehicle for an operator, to keep it separate, or at a zone on its way.
+"""Holds a vehicle: for an operator, to keep it separate, at a zone, while its id is shared.
 
 A hold is sent before any transfer, and kept until it ends.
 
@@ -23,6 +23,7 @@ from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Point, ThreatZone
 
+SHARED_ID = 'shared id'  # source of a hold while another node reports the UAV, too
 _ZONE = 'zone'
 
 
@@ -30,7 +31,7 @@ _ZONE = 'zone'
 class HoldRequest:
     """A hold, or its end."""
 
-    source: str  # `operator`, `separation` or `zone`; the last request of each counts
+    source: str  # `operator`, `separation`, `zone` or SHARED_ID; the last of each counts
     hold: bool  # or go on
     reason: str = ''  # for users
 
@@ -68,6 +69,11 @@ class HoldRule:
     def reason(self) -> str:
         """Who holds it, and why; '' where nobody does."""
         return '; '.join(f'{each.source}: {each.reason}' for each in self._requests.values())
+
+    @property
+    def for_shared_id(self) -> bool:
+        """Whether it holds as another node reports its UAV, too."""
+        return SHARED_ID in self._requests
 
     def request(self, request: HoldRequest, now: float) -> None:
         """Take a request, which replaces that of the same source."""
@@ -142,13 +148,16 @@ class HoldRule:
                                      'board'), now)
 
     def stay(self, now: float) -> NextMessages:
-        """Let the list be transferred while it holds, but no more; None: it is not to hold."""
+        """Let the list be transferred while it holds, but no more; None: it is not to hold.
+
+        Where its id is shared the list may be that of the other one, and is not transferred.
+        """
         if not self._requests or self._sender.climbing:
             return None
         stops = self._onboard.remaining().stops
         if self.at_zone and not stops:
             return None  # it holds, waits or returns by its list
-        out = self._update_mission(now) if stops else None
+        out = self._update_mission(now) if stops and not self.for_shared_id else None
         if out is not None:
             return out
         return self._sender.wait_for(f'the end of its hold ({self.reason})')

@@ -27,7 +27,7 @@ class Policy:
     zones_known: bool = False  # `zones` were received; else they are empty until then
     fence_area: FenceShape | None = None  # that all vehicles stay in
     rally: tuple[RallyPoint, ...] = ()  # places to return to; the store is left alone without
-    settling: str = ''  # as `grounded`, at the start of the bridge and soon over
+    settling: str = ''  # what take-offs and lists in the air wait for at the start; soon over
 
     @property
     def no_fly_zones(self) -> tuple[ThreatZone, ...]:

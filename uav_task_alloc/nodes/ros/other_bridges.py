@@ -15,10 +15,11 @@ from uav_task_alloc.errors import first_of
 from uav_task_alloc.nodes.conversions.messages import STATES
 
 _TOPIC = 'uav_states'
-_SEARCH_PERIOD = 1.0  # [s]
+_SEARCH_PERIOD = 0.25  # [s]
 # [s] from the start in which other nodes are found: Fast DDS announces a node each 3 s, or 0.2 s
 SETTLING_TIME = 8.0
 _RECENT = 5.0  # [s] since the last report of another node
+_SEVERAL = 3  # reports of a UAV by another node after which one in flight holds
 _OWN_REPORTS = 500  # of the bridge, to tell them from others; its queue is shorter
 
 
@@ -27,6 +28,9 @@ class OtherBridges:
 
     It would fly another vehicle along the same lists: two fleets in one ROS system without
     namespaces. States are subscribed to only while another node publishes some.
+
+    Arguments of methods:
+        now: steady time [s].
 
     Args:
         node: the bridge, which publishes `uav_states`.
@@ -38,7 +42,9 @@ class OtherBridges:
         self._lock = threading.Lock()  # of the next three: the bridge publishes in another thread
         self._own: deque[tuple[str, int, int]] = deque(maxlen=_OWN_REPORTS)  # UAV, stamp
         self._ids: set[str] = set()  # of UAVs that the bridge has reported
-        self._reported: dict[str, float] = {}  # [s] steady time, by UAV
+        # how often in a row, and [s] steady time of the last, by UAV
+        self._reported: dict[str, tuple[int, float]] = {}
+        self._publishers: tuple[str, ...] = ()  # names of all nodes that publish states
 
     def note_own(self, msg: m.UavState) -> None:
         """Remember a state of the bridge.
@@ -51,11 +57,15 @@ class OtherBridges:
             self._own.append(_key(msg))
 
     def search(self, now: float) -> None:
-        """Subscribe while another node publishes states; `now` is the steady time [s]."""
+        """Subscribe while another node publishes states."""
         if now - self._searched < _SEARCH_PERIOD:
             return
         self._searched, node = now, self._node
-        others = node.count_publishers(node.resolve_topic_name(_TOPIC)) > 1
+        topic = node.resolve_topic_name(_TOPIC)
+        others = node.count_publishers(topic) > 1
+        self._publishers = tuple(sorted(
+            f'{each.node_namespace.rstrip("/")}/{each.node_name}'
+            for each in node.get_publishers_info_by_topic(topic))) if others else ()
         if others and self._subscription is None:
             self._subscription = node.create_subscription(
                 m.UavState, _TOPIC, self._on_state, STATES)
@@ -64,42 +74,52 @@ class OtherBridges:
             self._subscription = None
 
     def settling(self, now: float) -> str:
-        """Return what a first take-off waits for: others to be found; '' once they would be.
-
-        Args:
-            now: steady time [s].
-        """
+        """Return what a first take-off waits for: others to be found; '' once they would be."""
         return '' if now - self._began >= SETTLING_TIME else 'the search for other bridges'
 
     def grounded(self, now: float) -> str:
-        """Return what a take-off waits for; '' where it waits for nothing.
-
-        Args:
-            now: steady time [s].
-        """
+        """Return what a take-off waits for; '' where it waits for nothing."""
         return ('ids of its own: another node reports UAVs of this bridge, too'
                 if self._shared(now) else '')
 
-    def warning(self, now: float) -> str:
-        """Return which UAVs another node reports, too; '' where it reports none.
+    def shared(self, uav_id: str, now: float) -> str:
+        """Return that another node reports a UAV, too, and which nodes; '' where none does.
 
         Args:
-            now: steady time [s].
+            uav_id: of the bridge.
+            now: see the class.
         """
+        with self._lock:
+            count, at = self._reported.get(uav_id, (0, 0.0))
+        if count < _SEVERAL or now - at > _RECENT:
+            return ''
+        return f'another node reports {uav_id}, too{self._names()}'
+
+    def warning(self, now: float) -> str:
+        """Return which UAVs another node reports, too; '' where it reports none."""
         shared = self._shared(now)
-        return (f'{first_of(shared)}: another node reports UAVs of these ids, too, so that two '
-                'vehicles may fly one list; none takes off: expected a namespace or '
-                'ROS_DOMAIN_ID for each fleet, or another uav_id_pattern') if shared else ''
+        return (f'{first_of(shared)}: another node reports UAVs of these ids, too{self._names()}, '
+                'so that two vehicles may fly one list; none takes off, and those in flight hold: '
+                'expected a namespace or ROS_DOMAIN_ID for each fleet, or another uav_id_pattern'
+                ) if shared else ''
+
+    def _names(self) -> str:
+        """The nodes that publish states, where they are known."""
+        names = self._publishers
+        return f' (states are published by {" and ".join(names)})' if names else ''
 
     def _on_state(self, msg: m.UavState) -> None:
+        now = time.monotonic()
         with self._lock:
             if msg.uav_id in self._ids and _key(msg) not in self._own:
-                self._reported[msg.uav_id] = time.monotonic()
+                count, at = self._reported.get(msg.uav_id, (0, -math.inf))
+                self._reported[msg.uav_id] = (count if now - at <= _RECENT else 0) + 1, now
 
     def _shared(self, now: float) -> list[str]:
         """The UAVs that another node has reported lately."""
         with self._lock:
-            return sorted(uav_id for uav_id, at in self._reported.items() if now - at <= _RECENT)
+            return sorted(uav_id for uav_id, (_, at) in self._reported.items()
+                          if now - at <= _RECENT)
 
 
 def _key(msg: m.UavState) -> tuple[str, int, int]:

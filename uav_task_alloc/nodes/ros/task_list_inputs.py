@@ -60,7 +60,16 @@ class TaskListInputs:
             self._log.write('warning', f'{uav_id}/task_list: {error}: ignored')
         self._on_change()
 
-    def take(self) -> dict[str, TaskList]:
-        """Return the waiting lists by UAV, and forget them."""
-        pending, self.pending = self.pending, {}
-        return pending
+    def take(self, waits: Callable[[str], object] = lambda uav_id: False) -> dict[str, TaskList]:
+        """Return the waiting lists by UAV, and forget them.
+
+        Args:
+            waits: whether the list of a UAV goes on waiting.
+
+        Returns:
+            Those that do not.
+        """
+        taken = {uav_id: each for uav_id, each in self.pending.items() if not waits(uav_id)}
+        self.pending = {uav_id: each for uav_id, each in self.pending.items()
+                        if uav_id not in taken}
+        return taken
