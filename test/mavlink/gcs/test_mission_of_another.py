@@ -12,6 +12,7 @@ from authority_bench import (
     set_mode,
     status_is,
 )
+from findings_bench import drop_messages
 from flight_bench import FlightBench
 from mission_bench import OURS, make_vehicle, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -273,3 +274,19 @@ def test_late_positions_are_of_one_vehicle():
         found.receive((20.0 * n, 0.0, 50.0), 1.0 * n, 1.0 * n)
         found.receive((20.0 * n - 40.0, 0.0, 50.0), n - 2.0, 1.0 * n, late=True)
         assert not found.found(1.0 * n)
+
+
+def test_a_mission_of_px4_that_another_has_cleared_leads_to_its_hold_not_to_an_end_of_ours():
+    """What it reports then is no refusal of an upload that was verified long before."""
+    bench = flying('px4', configs={1: {'reports_mission_state': True}})
+    bench.run(limit=8.0)
+    for kind in ('HEARTBEAT', 'MISSION_ACK', 'MISSION_COUNT'):
+        drop_messages(bench, 'down', kind, lambda m: hidden[0])
+    hidden = [True]
+    bench.from_station(d.MAVLink_mission_clear_all_message(1, 1))
+    mission = bench.executor().telemetry.mission
+    assert bench.run(lambda: mission.state == d.MISSION_STATE_NO_MISSION, 3.0)
+    hidden[0] = False
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == bench.executor().watch.mode,
+                     3.0)
+    assert status_is(bench, L)

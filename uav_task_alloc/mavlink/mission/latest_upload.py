@@ -14,7 +14,7 @@ class LatestUpload:
 
     Attributes:
         running: what is being uploaded, until it is verified or has failed; None: nothing is.
-        taken: the vehicle has taken all items of the latest upload.
+        taken: the vehicle has taken all items of the running upload.
         started_at: [s] of the latest.
         item_time: [s] that an item takes, smoothed over the uploads.
 
@@ -76,7 +76,7 @@ class LatestUpload:
 
     def end(self) -> None:
         """Note that the running one has ended, and what it has put on board is known."""
-        self.running = None
+        self.running, self.taken = None, False
 
     def leave(self, may_be_stored: bool) -> MissionDiff | None:
         """End the running one without its verification.
@@ -88,8 +88,9 @@ class LatestUpload:
             What was sent, where the vehicle has taken it or cannot have; None: that is not known
             until the mission is read back.
         """
-        sent, self.running = self.running, None
-        if may_be_stored and not self.taken:
+        sent, taken = self.running, self.taken
+        self.end()
+        if may_be_stored and not taken:
             self._unconfirmed = sent
             return None
         return sent and sent[0]
@@ -101,4 +102,5 @@ class LatestUpload:
 
     def forget(self) -> None:
         """Forget what was sent: the vehicle was restarted."""
-        self.running = self._unconfirmed = None
+        self.end()
+        self._unconfirmed = None
