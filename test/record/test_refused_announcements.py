@@ -82,6 +82,20 @@ def test_only_what_may_change_a_task_is_an_event(action, state, more, texts):
     assert [text for _, text in sentences(run, line)] == texts
 
 
+def test_a_second_cancel_before_the_next_statuses_is_no_event():
+    run = RunState()
+    announce(run, 'ADD', 100.0, 1.0)
+    status(run, 'ASSIGNED')
+    assert texts_of(run, 'CANCEL') == ['to be withdrawn: t1']
+    announce(run, 'CANCEL', 100.0, 3.0)
+    assert texts_of(run, 'CANCEL') == []
+    status(run, 'CANCELLED')
+    run.apply({'kind': 'statuses', 'wall': 5.0, 'statuses': []})  # forgotten
+    announce(run, 'ADD', 100.0, 6.0)
+    status(run, 'ASSIGNED')
+    assert texts_of(run, 'CANCEL') == ['to be withdrawn: t1']
+
+
 def texts_of(run, action, task_id='t1'):
     line = {'kind': 'announcement', 'wall': 3.0, 'action': action,
             'tasks': [{'id': task_id, 'position': [900.0, 0.0, 50.0]}]}
