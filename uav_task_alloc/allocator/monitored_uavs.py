@@ -37,7 +37,8 @@ from uav_task_alloc.separation.rule import FORGOTTEN
 _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
 _SPARE = 60.0  # [s] at least for which a UAV that is low on battery could hold
-_FOREIGN, HELD_CLAIM, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
+FOREIGN_CLAIM, HELD_CLAIM = 9.0, 8.0  # see above
+_URGENT, _RETURNS, _FLIES, _WAITS = 5.0, 3.0, 1.0, 0.0  # claims
 _STAYS = 'has no tasks and stays: a task for it, or its return, ends that'
 _GIVES_WAY = 'has no tasks: it gives way where that is safe, else a task or its return ends that'
 _OURS = ('', 'UNKNOWN', 'HELD')  # authority over a UAV in the air that flies its list
@@ -103,7 +104,8 @@ class MonitoredUavs:
             if record.silent:  # it may fly its list on
                 way = replace(way, on_board=tuple((t - age, point) for t, point in (
                     self._along_reported(uav_id, record, flight))))
-            return MonitoredUav(way, (_FOREIGN,), False, f'{uav_id} {why}')
+            return MonitoredUav(way, (FOREIGN_CLAIM,), False, f'{uav_id} {why}',
+                                stays=why if way.speed < MOVES else '')
         if is_held:
             return MonitoredUav(self._way(record, [(0.0, report.position)]), (HELD_CLAIM,), False,
                                 f'an operator holds {uav_id}')

@@ -56,7 +56,8 @@ def _changes_nothing(state: RunState, line: Line, row: Line) -> bool:
         return state.statuses.is_forgotten(task_id) or (
             known is None and bool(state.statuses.tasks))
     if action == 'CANCEL':
-        return task_id in state.cancelled or status is not None and status.state in ('COMPLETED', 'CANCELLED')
+        return task_id in state.cancelled or (
+            status is not None and status.state in ('COMPLETED', 'CANCELLED'))
     now = line['wall'] - state.allocators.lead.seconds
     return known is not None and status is not None and is_refused(
         known, status, row, action, now)

@@ -108,7 +108,8 @@ def planned_flights(world: World, lists: Mapping[str, UavList],
         stamp: [s] published clock.
 
     Returns:
-        By UAV; up to about twice the horizon of the rule where plans follow each other.
+        By UAV, also of those that hover without a list; up to about twice the horizon of the
+        rule where plans follow each other.
     """
     flights, rule = {}, separation_of(world.params)
     until = _AHEAD * rule.horizon if world.params.background_budget > 0.0 else math.inf
@@ -122,6 +123,11 @@ def planned_flights(world: World, lists: Mapping[str, UavList],
             continue
         flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp, rule, until,
                                   uav_id == mover)
+    for uav_id in sorted(world.uav_records().keys() - lists.keys()):  # as a pilot has all along
+        flight = world.flights.of(uav_id, stamp)
+        if flight is not None and not flight.on_ground and not world.flights.is_forgotten(
+                uav_id, stamp) and math.hypot(*(flight.velocity or (0.0,))) < _RESTS:
+            flights[uav_id] = _empty(uav_id, flight, rule)
     return flights
 
 

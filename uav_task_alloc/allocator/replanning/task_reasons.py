@@ -27,7 +27,7 @@ def task_steps(world: World, left_out: Mapping[str, str]) -> list[TaskStep]:
     owners, late = world.lists.owners(), world.deadlines.texts
     trips = {task_id: (uav_id, number) for uav_id, rows in world.later.items()
              for number, row in enumerate(rows, 1) for task_id in row}
-    steps = []
+    steps, left_out = [], {**left_out, **world.obstructed}
     for record in world.tasks.open():
         task_id = record.task.id
         uav_id, why = owners.get(task_id, ''), late.get(task_id, '')

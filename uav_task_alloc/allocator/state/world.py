@@ -90,6 +90,7 @@ class World:
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
         self.stuck: frozenset[str] = frozenset()  # UAVs that wait for one that waits for them
+        self.obstructed: dict[str, str] = {}  # why a task is put off, by its id
         self.tasks, self.orders = TaskRegistry(saved.tasks), Orders(saved.orders)
         self.fleet = Fleet(saved.switched_off, {
             record.uav: record.task.id for record in saved.tasks
@@ -272,15 +273,23 @@ class World:
         return self.fleet.uav(uav_id, self.params)
 
     def tasks_to_plan(self) -> tuple[Task, ...]:
-        """Return the open tasks as orders allow them, less those that stay with unusable UAVs."""
-        return self.ordered.tasks_to_plan(self.restart_hold, self.params.route_end == 'home')
+        """Return the open tasks as orders allow them, less those that stay with unusable UAVs.
+
+        Those that are put off are left out, too.
+        """
+        return tuple(task for task in self.ordered.tasks_to_plan(
+            self.restart_hold, self.params.route_end == 'home') if task.id not in self.obstructed)
 
     def locked_tasks(self) -> dict[str, tuple[str, ...]]:
         """Return the tasks of each UAV that a plan may not move, in the order flown."""
-        return self.ordered.locked(
+        locked = self.ordered.locked(
             locked_tasks(self.tasks, self.fleet, self.lists, self.params.locked_tasks,
                          self.restart_hold, self.flights.serving),
             self.params.route_end == 'home')
+        if self.obstructed:
+            locked = {uav_id: tuple(task_id for task_id in ids if task_id not in self.obstructed)
+                      for uav_id, ids in locked.items()}
+        return {uav_id: ids for uav_id, ids in locked.items() if ids}
 
     def can_fly(self, uav_id: str, task_id: str) -> bool:
         """Return whether a task is open and a known UAV may fly it."""
