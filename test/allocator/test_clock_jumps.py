@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from allocation import AllocatorDriver
 
+from uav_task_alloc.allocator.core import FASTEST_CLOCK, REAL_CLOCK
 from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.records import UavReport
 
@@ -114,3 +115,20 @@ def test_a_list_of_a_previous_run_with_a_later_clock_waits_no_longer():
         driver.world.list_of('a'), revision=4, stamp=5000.0)
     driver.core.tick(driver.now, 10.0)
     assert driver.world.list_of('a').stamp == 10.0
+
+
+@pytest.mark.parametrize(('rate', 'shifted'), [(REAL_CLOCK, True), (FASTEST_CLOCK, False)])
+def test_twenty_seconds_at_once_are_a_jump_of_a_computer_not_of_a_fast_simulation(rate, shifted):
+    driver = AllocatorDriver()
+    driver.core.clock_rate = rate
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0))
+    driver.settle()
+    stop = replace(driver.lists['a'].stops[0], begin_after=driver.now + 90.0)
+    driver.world.publish({'a': replace(driver.lists['a'], stops=(stop,))}, driver.now)
+    begin = stop.begin_after
+    driver.core.tick(driver.now, driver.now)
+    driver.now += 0.1
+    driver.core.tick(driver.now, driver.now + 20.0)
+    after = driver.world.list_of('a').stops[0].begin_after
+    assert after == pytest.approx(begin + 19.9 * shifted, abs=0.2)

@@ -15,9 +15,9 @@ BEGIN = 10_000  # [s]
 class Inputs:
     """Hold messages of u1, and the requests that its bridge gets."""
 
-    def __init__(self):
+    def __init__(self, clock=None):
         self.now, self.requests, self.lines = float(BEGIN), [], []
-        self.inputs = HoldInputs(self, self, lambda: self.now, self.on_hold)
+        self.inputs = HoldInputs(self, self, lambda: self.now, self.on_hold, clock)
         self.inputs.subscribe('u1')
 
     def get_namespace(self):
@@ -53,6 +53,19 @@ def test_without_an_allocator_a_separation_hold_ends_in_a_minute_whatever_the_cl
     assert bridge.requests == [('separation', True), ('separation', False)]
     bridge.fly(200)
     assert len(bridge.requests) == 2
+
+
+@pytest.mark.parametrize('by', [-3600.0, -20.0, 20.0, 3600.0])
+def test_where_the_clock_of_the_computer_leaps_a_separation_hold_lasts_as_long(by):
+    steady = [50.0]
+    bridge = Inputs(lambda: steady[0])
+    bridge.take(hold(m.UavHold.SEPARATION, BEGIN + 60))
+    bridge.now += by
+    for seconds, requests in ((45.0, [('separation', True)]),
+                              (16.0, [('separation', True), ('separation', False)])):
+        steady[0] += seconds
+        bridge.fly(1)
+        assert bridge.requests == requests
 
 
 def test_a_hold_of_an_operator_ends_when_it_says():

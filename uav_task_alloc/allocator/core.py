@@ -43,7 +43,8 @@ from uav_task_alloc.terrain import Terrain
 # [s] after a restart, from the lists and the first report of the last UAV on, in which no task
 # changes its UAV: the bridge repeats events that were missed 2 s after it has its list again
 _RESTART_HOLD = 3.0
-_CLOCK_STEP, _FASTEST = 5.0, 200.0  # [s] that clocks may be apart; times real time
+_CLOCK_STEP = 5.0  # [s] that clocks may be apart
+FASTEST_CLOCK, REAL_CLOCK = 200.0, 2.0  # times real time: of a simulation, of a computer
 _LEARNED_PERIOD = 5.0  # [s] between two rows of the learned state
 
 
@@ -88,6 +89,7 @@ class Allocator:
         self._learned = saved.learned
         self._learned_saved = now  # [s]
         self._clock: tuple[float, float] | None = None  # published and steady [s], last tick
+        self.clock_rate = FASTEST_CLOCK  # times real time at which the published clock may run
         self._publisher = PlanPublisher(self.world, self._best, now)
         # UAVs of the journal get time to report before they lose their tasks
         proposed = saved.proposal.lists if saved.proposal else ()
@@ -165,7 +167,7 @@ class Allocator:
             newest = max((each.stamp for each in world.lists.lists.values()), default=stamp)
             last = max(newest, stamp), now
         before, since = last
-        latest = before + _CLOCK_STEP + _FASTEST * (now - since)
+        latest = before + _CLOCK_STEP + self.clock_rate * (now - since)
         jumped = not before - _CLOCK_STEP <= stamp <= latest
         began = before <= 0.0 < stamp and jumped
         if began or (since == now and stamp > _CLOCK_STEP):

@@ -12,7 +12,7 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator import Allocator
+from uav_task_alloc.allocator.core import FASTEST_CLOCK, REAL_CLOCK, Allocator
 from uav_task_alloc.allocator.leader import Role
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import LogNote, TaskVerdict
@@ -200,6 +200,7 @@ class AllocatorNode(Node):
             return
         if not self.pending:  # each step would look at all tasks again, and nothing be published
             self.world.set_params(self.live.now, now)
+            self.core.clock_rate = FASTEST_CLOCK if is_simulated(self) else REAL_CLOCK
             self.core.tick(now, stamp)
         self.start_solve(now, stamp)
         self.publish(stamp)

@@ -117,7 +117,9 @@ class MavlinkBridge(Node):
             'warning', f'fleet_origin: {reason}: ignored'))
         self.lists = TaskListInputs(self, self.log, self.to_list, self.assign_lists)
         self.others = OtherBridges(self)
-        self.holds = HoldInputs(self, self.log, self.stamp, self.on_hold)
+        self.holds = HoldInputs(  # the clock of a computer may leap
+            self, self.log, self.stamp, self.on_hold,
+            lambda: self.stamp() if is_simulated(self) else time.monotonic())
         self.create_service(HandOver, '~/hand_over', self.on_hand_over)
         steady = steady_clock()  # links and vehicles do not wait for simulated time
         self.create_timer(0.05, self.on_timer, clock=steady)

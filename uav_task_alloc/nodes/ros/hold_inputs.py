@@ -84,13 +84,16 @@ class HoldInputs:
         log: of refused messages.
         stamp: the published clock [s].
         apply: called with (uav_id, request).
+        clock: [s] by which holds to keep UAVs separate end; None: the published one.
     """
 
     def __init__(self, node: Node, log: LeveledLog, stamp: Callable[[], float],
-                 apply: Callable[[str, HoldRequest], None]) -> None:
+                 apply: Callable[[str, HoldRequest], None],
+                 clock: Callable[[], float] | None = None) -> None:
         self._node, self._log, self._stamp, self._apply = node, log, stamp, apply
+        self._clocks = {'separation': clock or stamp}  # of others: the published one
         self._known: set[str] = set()  # UAVs
-        # [s] published clock when a hold ends, by UAV and source
+        # [s] of the clock of its source when a hold ends, by UAV and source
         self._expires: dict[tuple[str, str], float] = {}
         self.late = LateHolds(lambda text: log.write('warning', text))
 
@@ -126,13 +129,17 @@ class HoldInputs:
         expires = hold_expiry(msg, now)
         if request.hold and expires <= now:
             request = HoldRequest(request.source, False)
-        self._expires[uav_id, request.source] = expires if request.hold else math.inf
+        self._expires[uav_id, request.source] = (
+            self._now(request.source) + expires - now if request.hold else math.inf)
         self._apply(uav_id, request)
+
+    def _now(self, source: str) -> float:
+        return self._clocks.get(source, self._stamp)()
 
     def step(self) -> None:
         """End the holds that have expired."""
-        now = self._stamp()
         for (uav_id, source), expires in self._expires.items():
+            now = self._now(source)
             if now >= expires:
                 self._expires[uav_id, source] = math.inf
                 self._apply(uav_id, HoldRequest(source, False))
