@@ -19,6 +19,7 @@ from uav_task_alloc.mavlink.gcs.hand_over import HandOver
 from uav_task_alloc.mavlink.gcs.link_loss import LinkLoss
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.mode_changes import ModeChanges
+from uav_task_alloc.mavlink.gcs.moved_in_hold import MovedInHold
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.sent_commands import SentCommands
 from uav_task_alloc.mavlink.gcs.suspension_checks import check_foreign, check_system_status
@@ -64,6 +65,7 @@ class AuthorityWatch:
         self._hand_over = HandOver(state, evidence, policy)
         self._grant = TakeoffGrant(state, policy)
         self._climb = ClimbCheck(state, evidence)
+        self._moved = MovedInHold(state)
         self.continues_climb = False
         # ArduPilot, in GUIDED: nothing else shows that it still climbs
         if record and record.armed and record.climb is not None and profile.takeoff_mode is None:
@@ -154,6 +156,7 @@ class AuthorityWatch:
         self._hand_over.step(now)
         self._arming.step(now)
         self._climb.step(now)
+        self._moved.step(now)
         self._grant.step(now)
         check_foreign(self._state, self.yields, now)
 
@@ -188,6 +191,7 @@ class AuthorityWatch:
         if mode is not None:
             sent.climb = None
             self._climb.end()
+            self._moved.note_command(state.class_of(mode) is ModeClass.HOLD)
             sent.acks.command_sent(message.command, mode, now)
             sent.add_mode(mode, now)
             if state.descending and not state.is_return(mode):
@@ -197,6 +201,7 @@ class AuthorityWatch:
             sent.add_arming(message.param1 == 1.0, now)
         elif message.command == d.MAV_CMD_NAV_TAKEOFF:
             state.descending = False
+            self._moved.note_command(holds=False)
             self._climb.begin(self._policy().cruise_altitude)
             sent.climb, takeoff_mode = self._policy().cruise_altitude, state.profile.takeoff_mode
             if takeoff_mode is not None:
