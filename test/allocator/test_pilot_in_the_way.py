@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A UAV whose way leads to where a pilot hovers with another one is led past it."""
+from dataclasses import replace
+
 from test_separation_watch import Sky
 
 from uav_task_alloc.model import Task
@@ -49,7 +51,7 @@ def test_how_long_one_holds_is_said_and_logged():
     assert sky.levels[text] == 'warning'
 
 
-def test_a_task_at_which_a_pilot_hovers_is_put_off_until_he_has_left():
+def sky_with_a_task_put_off():
     sky = SkyWithPilot(x=200.0)
     sky.add(Task('t3', (200.0, 200.0, 50.0), allowed_uavs=frozenset({'u1'})))
     sky.settle(1.0, report=False)
@@ -61,10 +63,25 @@ def test_a_task_at_which_a_pilot_hovers_is_put_off_until_he_has_left():
     assert sky.world.list_of('u1').task_ids == ('t3',)
     assert (sky.state('t1'), sky.reason('t1')) == (
         'UNASSIGNED', 'u2 hovers there, and is not flown by the allocator')
+    return sky
+
+
+def test_a_task_at_which_a_pilot_hovers_is_put_off_until_he_has_left():
+    sky = sky_with_a_task_put_off()
     sky.x = 900.0
     sky.report((160.0, 0.0, 50.0), (900.0, 0.0, 50.0))
     sky.step(1.0)
     sky.settle(0.5, report=False)
+    assert sorted(sky.world.list_of('u1').task_ids) == ['t1', 't3']
+
+
+def test_a_task_that_was_put_off_is_planned_again_once_separation_is_off():
+    sky = sky_with_a_task_put_off()
+    for _ in range(3):
+        sky.stand()
+    sky.world.set_params(replace(sky.world.params, separation__horizontal=0.0), sky.now)
+    for _ in range(3):
+        sky.stand()
     assert sorted(sky.world.list_of('u1').task_ids) == ['t1', 't3']
 
 

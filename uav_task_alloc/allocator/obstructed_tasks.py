@@ -53,7 +53,7 @@ class ObstructedTasks:
     def _is_at(self, uav_id: str, task: Task, rule: Separation) -> bool:
         """Whether a UAV is too near to the place or the path of a task."""
         record, points = self._world.uav_records().get(uav_id), task.path or (task.position,)
-        if record is None:
+        if record is None or not rule.on:
             return False
         far = min(segment_distance(record.report.position, a, b)
                   for a, b in pairwise((points[0], *points)))

@@ -60,7 +60,8 @@ class SeparationWatch:
         """
         rule = separation_of(self._world.params)
         due = lists_changed or not 0.0 <= stamp - self._stepped < _PERIOD
-        if not due or not (rule.on or self.monitor.holding or self.monitor.alerts):
+        in_force = rule.on or self.monitor.holding or self.monitor.alerts
+        if not due or not (in_force or self._world.obstructed):
             return MonitorStep()
         self._stepped = stamp
         self._uavs = self._monitored.at(stamp)
