@@ -11,11 +11,13 @@ import pytest
 
 TEST = Path(__file__).parent
 DOCS = """
+import signal
 import sys
 from contextlib import ExitStack
 from pathlib import Path
 from docs_pages import ROOT, Block
 from test_docs import Sandbox
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
 block = Block(ROOT / 'README.md', 1, 'bash', sys.argv[2], 'until', 'started')
 with ExitStack() as stack:
     sandbox = Sandbox(Path(sys.argv[1]), stack)

@@ -5,6 +5,8 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
 
@@ -39,11 +41,16 @@ def journal(folder, rows=(ROW,)):
     return folder / FILE_NAME
 
 
+@pytest.fixture
+def open_path():
+    """A folder that all users may enter; the parents of `tmp_path` are closed to them."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        yield Path(folder)
+
+
 def start_as_other(folder):
     """What another user's allocator says: the error, or the revision and what is logged."""
-    for each in folder.parents:
-        if each.name.startswith('pytest'):
-            each.chmod(0o755)
     done = subprocess.run([sys.executable, '-c', START, str(folder), str(OTHER)], text=True,
                           check=True, stdout=subprocess.PIPE,
                           env={**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)})
@@ -52,33 +59,31 @@ def start_as_other(folder):
 
 @needs_root
 @pytest.mark.parametrize('what', ['file', 'folder'])
-def test_what_another_user_may_not_read_is_refused(tmp_path, what):
-    file = journal(tmp_path / 'state')
-    tmp_path.chmod(0o755)
+def test_what_another_user_may_not_read_is_refused(open_path, what):
+    file = journal(open_path / 'state')
     (file if what == 'file' else file.parent).chmod(0)
-    said = start_as_other(tmp_path / 'state')
+    said = start_as_other(open_path / 'state')
     assert said.startswith(f'JournalUnreadable {file} cannot be copied: [Errno 13] Permission ')
     assert said.endswith(': expected a journal that can be read, as the tasks in it would be '
                          'forgotten: make it readable, or set another state_dir')
 
 
 @needs_root
-def test_a_journal_that_another_user_may_only_read_is_restored(tmp_path):
-    file = journal(tmp_path / 'state')
-    for path, mode in ((tmp_path, 0o755), (file.parent, 0o555), (file, 0o444)):
+def test_a_journal_that_another_user_may_only_read_is_restored(open_path):
+    file = journal(open_path / 'state')
+    for path, mode in ((file.parent, 0o555), (file, 0o444)):
         path.chmod(mode)
-    said = start_as_other(tmp_path / 'state')
+    said = start_as_other(open_path / 'state')
     assert said.startswith(f'7 {file} cannot be opened: ')
     assert said.endswith(f' (this user may not write to {file}); tried again every 1 s')
 
 
 @needs_root
-def test_a_folder_that_may_not_be_written_and_has_no_journal_ends_no_start(tmp_path):
-    tmp_path.chmod(0o755)
-    (tmp_path / 'state').mkdir(mode=0o555)
-    said = start_as_other(tmp_path / 'state')
-    assert said.startswith(f'0 {tmp_path / "state" / FILE_NAME} cannot be opened: ')
-    assert said.endswith(f' (this user may not write to {tmp_path / "state"}); '
+def test_a_folder_that_may_not_be_written_and_has_no_journal_ends_no_start(open_path):
+    (open_path / 'state').mkdir(mode=0o555)
+    said = start_as_other(open_path / 'state')
+    assert said.startswith(f'0 {open_path / "state" / FILE_NAME} cannot be opened: ')
+    assert said.endswith(f' (this user may not write to {open_path / "state"}); '
                          'tried again every 1 s')
 
 
