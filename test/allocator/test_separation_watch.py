@@ -369,3 +369,27 @@ def test_one_that_stands_for_an_upload_is_in_the_way_until_its_list_is_on_board(
     sky.more[1] |= {'mode': 'ON_MISSION', 'list_revision': sky.revision + 1}
     sky.report((-140.0, 0.0, 50.0), (0.0, 0.0, 50.0))
     assert sky.step() == [('u1', False)]
+
+
+def test_of_two_that_stopped_a_little_too_near_the_one_with_a_way_out_goes_on():
+    still = {'mode': 'HOLD', 'velocity': (0.0, 0.0, 0.0)}
+    sky = Sky(still, still)
+    places = (0.0, 0.0, 50.0), (29.99, 0.0, 50.0)
+    sky.world.params = AllocatorParams(background_budget=0.0, route_end='hold')
+    sky.cancel('t1', 't2')
+    # u1 would fly to below u2, and straight ahead u2 would pass u1
+    sky.add(Task('t3', (27.0, -15.0, 43.0), allowed_uavs=frozenset({'u1'})),
+            Task('t4', (-25.0, -53.0, 31.0), allowed_uavs=frozenset({'u2'})))
+    sky.report(*places)
+    sky.settle(report=False)
+    sky.world.params = AllocatorParams(background_budget=0.0, route_end='hold',
+                                       separation__horizontal=30.0, separation__vertical=10.0)
+    found = []
+    for _ in range(30):
+        sky.report(*places)
+        found += sky.step(1.0)
+        sky.settle(report=False)
+    assert sorted(found[:2]) == [('u1', True), ('u2', True)]
+    assert [each for each in found if not each[1]] == [('u2', False)]
+    assert sky.world.list_of('u1').stops[0].leg.via == ()
+    assert all(abs(z - 50.0) >= 10.0 for _, _, z in sky.world.list_of('u2').stops[0].leg.via)

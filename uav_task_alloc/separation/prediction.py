@@ -20,7 +20,7 @@ _REACTION = 2.0  # [s] until a hold that is published is flown
 _BRAKING = 2.5  # [m/s2]
 _MARGIN = 1.0  # [m] horizontally, for positions between the points and errors of them
 _SLACK = 0.3  # [m] vertically: plans keep the vertical distance exactly, autopilots nearly
-_NEARER = 1.0  # [m] by which two that are too near already come nearer
+NEARER = 1.0  # [m] by which two that are too near already come nearer
 _SOONER = 0.5  # [s] by which a loss begins earlier
 _CLOSER = 0.1  # share of the distances by which a loss is worse
 # times the horizontal distance, and [s] more of time, that a UAV needs to go on
@@ -155,7 +155,7 @@ class FlightPredictions:
                                 other_holds=b in stops or b in self._holding)
         current = self.loss(a, b)
         return stopped is None or (current is not None
-                                   and stopped.horizontal > current.horizontal - _NEARER
+                                   and stopped.horizontal > current.horizontal - NEARER
                                    and stopped.begins > current.begins - _SOONER
                                    and stopped.share > current.share - _CLOSER)
 
@@ -243,8 +243,8 @@ def _first_loss(a: _Floats, b: _Floats, horizontal: float, vertical: float, shif
     now = math.hypot(a[0, 0] - b[0, 0], a[0, 1] - b[0, 1])
     height, beside, below, room = abs(a[0, 2] - b[0, 2]), 0.0, 0.0, horizontal
     if now < horizontal and height < vertical and not (a_on_pad[0] and b_on_pad[0]):
-        beside, below = min(now + _NEARER, horizontal), height - _NEARER
-        horizontal, shifts = max(0.0, now - _NEARER), 0
+        beside, below = min(now + NEARER, horizontal), height - NEARER
+        horizontal, shifts = max(0.0, now - NEARER), 0
     for shift in range(0, shifts + 1, _SHIFT):
         for first_of, then_of in _ranges(shift):
             one, two = a[first_of], b[then_of]

@@ -17,7 +17,7 @@ from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.model import Leg, Point
 from uav_task_alloc.separation.flight_legs import Flight, FlightLeg, leg_times
 from uav_task_alloc.separation.leg_changes import TransitLimits
-from uav_task_alloc.separation.prediction import rule_to_go_on
+from uav_task_alloc.separation.prediction import NEARER, rule_to_go_on
 from uav_task_alloc.separation.resolution import STOPPED, Resolution, resolve
 from uav_task_alloc.separation.rule import Separation
 
@@ -26,6 +26,8 @@ _CHANGES = 20_000  # tried for each second of `solve_budget`, where the next pla
 # times the horizon of the uncertainty: what is later is left to later plans, where there are any
 _AHEAD = 2.0
 _DEAREST = 15.0  # [s] of flight that a return may cost; the monitor holds for about that time
+_MOST_MOVERS = 4  # of the UAVs that hold for each other, tried in turn
+_NEAREST = 1.0  # [m] horizontally, from where a UAV may fly off
 _LEAST = 1.0  # [s] of a wait; a shorter one is no change
 _RESTS = 1.0  # [m/s] below that a UAV stands
 _AT_PLACE = 2.0  # [m] it is at its waiting place
@@ -45,7 +47,6 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
         The same lists where nothing is in conflict.
     """
     lists = {uav_id: _with_high_return(world, each) for uav_id, each in built.lists.items()}
-    flights = planned_flights(world, lists, stamp)
     params, tried, most = world.params, count(), _MOST_CHANGES
     if params.background_budget > 0.0:
         most = min(most, round(_CHANGES * params.solve_budget))
@@ -53,16 +54,39 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
         params.altitude_min, params.altitude_max,
         lambda points: world.airspace.paths().leg_clear(*points), lambda: next(tried) >= most,
         _DEAREST)
-    found = resolve(list(flights.values()), separation_of(params), limits)
-    changed = {each.uav: each for each in found.flights}
-    if _mover(world, lists):  # the monitor lets it go on where its way is free by more than that
-        held = [each for uav_id, each in changed.items() if uav_id in world.stuck]
-        changed |= {each.uav: each for each in resolve(
-            held, rule_to_go_on(separation_of(params)), limits).flights}
+    movers, chosen = _movers(world, lists)[:_MOST_MOVERS], None
+    for mover in movers or ('',):
+        flights = planned_flights(world, lists, stamp, mover)
+        found = resolve(list(flights.values()), separation_of(params), limits)
+        changed = {each.uav: each for each in found.flights}
+        goes_on = not mover or _lets_go_on(world, mover, changed, limits)
+        if chosen is None or goes_on:
+            chosen = flights, found, changed
+        if goes_on:
+            break
+    assert chosen is not None  # there is a mover, or ''
+    flights, found, changed = chosen
     for uav_id, before in flights.items():
         if changed[uav_id] is not before:
             lists[uav_id] = _changed_list(world, lists[uav_id], before, changed[uav_id], stamp)
     return replace(built, lists=lists, together=_not_apart(found, flights))
+
+
+def _lets_go_on(world: World, mover: str, changed: dict[str, Flight],
+                limits: TransitLimits) -> bool:
+    """Change the leg of a UAV that holds so that the monitor lets it go on; whether it does.
+
+    Its way has to be free by more than the rule; it may fly off from where it is too near already.
+    """
+    held = [each for uav_id, each in changed.items() if uav_id in world.stuck]
+    rule, own = rule_to_go_on(separation_of(world.params)), changed[mover].position
+    now = min((math.dist(own[:2], each.position[:2]) for each in held if each.uav != mover
+               and abs(own[2] - each.position[2]) < rule.vertical), default=math.inf)
+    if now < rule.horizontal:
+        rule = replace(rule, horizontal=max(_NEAREST, now - NEARER))
+    found = resolve(held, rule, limits)
+    changed |= {each.uav: each for each in found.flights}
+    return not found.left
 
 
 def _not_apart(found: Resolution, flights: Mapping[str, Flight]) -> tuple[str, ...]:
@@ -98,14 +122,15 @@ def _with_high_return(world: World, each: UavList) -> UavList:
     return replace(each, end_via=(*each.end_via, above))
 
 
-def planned_flights(world: World, lists: Mapping[str, UavList],
-                    stamp: float) -> dict[str, Flight]:
+def planned_flights(world: World, lists: Mapping[str, UavList], stamp: float,
+                    mover: str | None = None) -> dict[str, Flight]:
     """Return what each known UAV flies by its list.
 
     Args:
         world: as it is now; separation is on.
         lists: by UAV.
         stamp: [s] published clock.
+        mover: the one of the UAVs that hold for each other whose leg can change; None: the first.
 
     Returns:
         By UAV, also of those that hover without a list; up to about twice the horizon of the
@@ -113,7 +138,7 @@ def planned_flights(world: World, lists: Mapping[str, UavList],
     """
     flights, rule = {}, separation_of(world.params)
     until = _AHEAD * rule.horizon if world.params.background_budget > 0.0 else math.inf
-    mover = _mover(world, lists)
+    mover = next(iter(_movers(world, lists)), '') if mover is None else mover
     for uav_id, each in lists.items():
         flight = world.flights.of(uav_id, stamp)
         if flight is None or world.flights.is_forgotten(uav_id, stamp):
@@ -131,14 +156,15 @@ def planned_flights(world: World, lists: Mapping[str, UavList],
     return flights
 
 
-def _mover(world: World, lists: Mapping[str, UavList]) -> str:
-    """The first of the UAVs that hold for each other whose leg can change; '': there is none."""
+def _movers(world: World, lists: Mapping[str, UavList]) -> list[str]:
+    """The UAVs that hold for each other whose legs can change."""
+    movers = []
     for uav_id in sorted(world.stuck & lists.keys()):
         record, stops = world.uav_record(uav_id), lists[uav_id].stops
         if record and stops and not _is_on_path(record.report.position, stops[0]) and (
                 math.hypot(*(record.report.velocity or (0.0,))) < _RESTS):
-            return uav_id
-    return ''
+            movers.append(uav_id)
+    return movers
 
 
 def _is_on_path(place: Point, stop: ListStop) -> bool:
