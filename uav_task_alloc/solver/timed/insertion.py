@@ -13,7 +13,7 @@ from uav_task_alloc.solver.routes import SIGNED
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.legs import join, leg_of
-from uav_task_alloc.solver.timed.places import excess_price, place_cost
+from uav_task_alloc.solver.timed.places import costs_less, excess_price, place_cost
 from uav_task_alloc.solver.timed.segments import update
 from uav_task_alloc.solver.timed.visits import (
     BASE_BEFORE,
@@ -33,15 +33,19 @@ from uav_task_alloc.solver.timed.ways import (
 
 @inline_kernel
 def try_place(a: TimedArrays, r: TimedRoutes, t: int, c: int, place: int, kind: int,
-              least: float) -> tuple[int, int, float]:
-    """The better of the place found so far and the one after node c. O(1)."""
+              least: float, far: bool) -> tuple[int, int, float]:
+    """The better of the place found so far and the one after node c. O(1).
+
+    far: most places are too far, and their legs not known.
+    """
     u = r.link[c, at.OF_UAV]
     for turned in range(directions(a, t)):
         if has_paths(a):
             face(a, r, t, turned == 1)
-        cost = place_cost(a, r, u, t, c, least)
-        if cost < least:
-            place, kind, least = SIGNED(c), NO_VISIT + TURNED * turned, cost
+        if not far or costs_less(a, r, u, t, c, least):
+            cost = place_cost(a, r, u, t, c, least)
+            if cost < least:
+                place, kind, least = SIGNED(c), NO_VISIT + TURNED * turned, cost
         if a.visits > 0:
             which, cost = cheapest_split(a, r, t, c, least)
             if cost < least:
@@ -169,13 +173,13 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
             before = _place_beside(a, r, t, m, least)
             u = _with_empty_first_trip(a, r, a.near[i, m >> 1]) if m & 1 == 0 else -1
             if u >= 0:
-                place, kind, least = try_place(a, r, t, LINK(u), place, kind, least)
+                place, kind, least = try_place(a, r, t, LINK(u), place, kind, least, False)
         else:
             k = a.near_class[i, m - sides]
             before = idle_uav(a, r, k) if k >= 0 else -1
         if before < 0 or (blinks > 0.0 and uniform(rng) < blinks):
             continue
-        place, kind, least = try_place(a, r, t, LINK(before), place, kind, least)
+        place, kind, least = try_place(a, r, t, LINK(before), place, kind, least, False)
     return place, kind, least
 
 
@@ -186,7 +190,7 @@ def place_anywhere(a: TimedArrays, r: TimedRoutes, t: int) -> tuple[int, int, fl
     for u in range(a.uavs):
         c = LINK(u)
         while c < a.ends or c >= a.bases:
-            place, kind, least = try_place(a, r, t, c, place, kind, least)
+            place, kind, least = try_place(a, r, t, c, place, kind, least, not a.straight)
             c = r.link[c, at.NEXT]
     return place, kind, least
 

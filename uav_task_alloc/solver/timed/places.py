@@ -79,13 +79,6 @@ def _trip_excess(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, slot: i
 def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: float) -> float:
     """Cost of inserting t after node c of UAV u's route; >= least if not less. O(1)."""
     then, head = r.link[c, at.NEXT], r.link[c, at.HEAD] if a.whole else LINK(u)
-    if not a.straight:  # past zones it takes long to look a leg up
-        metres, seconds = least_leg(a, r, u, c, t)
-        more, further = least_leg(a, r, u, t, then)
-        added = metres + more - r.row[c, at.LEG]
-        cost, _, _ = _legs_cost(a, r, u, t, c, head, added, seconds, further, least)
-        if cost >= least:
-            return math.inf
     metres, seconds = leg_of(a, r, u, c, t)
     more, further = leg_of(a, r, u, t, then)
     added = metres + more - r.row[c, at.LEG]
@@ -98,6 +91,20 @@ def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: fl
         if a.whole and a.fixed[t, at.TRIP_RELEASE] > -math.inf:
             cost += _cost_of_hold(a, r, t, head, then)
     return float(cost)
+
+
+@inline_kernel
+def costs_less(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: float) -> bool:
+    """Whether place_cost may be less than `least`, by straight legs. O(1).
+
+    Past zones it may take long to look a leg up.
+    """
+    then, head = r.link[c, at.NEXT], r.link[c, at.HEAD] if a.whole else LINK(u)
+    metres, seconds = least_leg(a, r, u, c, t)
+    more, further = least_leg(a, r, u, t, then)
+    added = metres + more - r.row[c, at.LEG]
+    cost, _, _ = _legs_cost(a, r, u, t, c, head, added, seconds, further, least)
+    return bool(cost < least)
 
 
 @inline_kernel
