@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What tests have started ends with them, also where they are killed."""
 import os
+import select
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -27,20 +27,10 @@ with ExitStack() as stack:
 """
 
 
-def is_running(pid):
-    """Whether a process runs; one that has ended may wait for its parent."""
-    try:
-        return Path(f'/proc/{pid}/stat').read_text().rpartition(') ')[2][0] != 'Z'
-    except OSError:
-        return False
-
-
-def until(condition):
-    end = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-    return True
+def received(pipe):
+    """The next byte of a pipe; b'': all who had it open have ended."""
+    assert select.select([pipe], [], [], 60.0)[0]
+    return os.read(pipe, 1)
 
 
 @pytest.mark.skipif(sys.platform != 'linux', reason='needs prctl')
@@ -48,22 +38,23 @@ def until(condition):
 @pytest.mark.parametrize('method', ['start', 'run'])
 def test_what_the_commands_of_a_page_have_started_ends_with_the_test(tmp_path, method, number):
     (tmp_path / 'box').mkdir()
-    pids = tmp_path / 'pids'
-    # a program in the foreground and one behind it, as a shell that is killed leaves both
-    command = f'sleep 600 & echo $! > {pids}; sh -c "echo \\$\\$ >> {pids}; exec sleep 600"'
+    pipe = tmp_path / 'pipe'  # which all that was started has open
+    os.mkfifo(pipe)
+    # a program in the background and one in the foreground: a killed shell ends neither
+    command = f'exec 3> {pipe}; sleep 600 & printf 1 >&3; sh -c "printf 2 >&3; exec sleep 600"'
     test = subprocess.Popen(
         [sys.executable, '-c', DOCS, str(tmp_path / 'box'), f'echo started; {command}', method],
         stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, cwd=TEST,
         env={**os.environ, 'PYTHONPATH': os.pathsep.join(
             [str(TEST), str(TEST.parent), *sys.path])})
+    started = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        until(lambda: pids.exists() and len(pids.read_text().split()) == 2)
-        started = [int(pid) for pid in pids.read_text().split()]
-        assert all(map(is_running, started))
+        assert {received(started), received(started)} == {b'1', b'2'}
+        assert not select.select([started], [], [], 0.2)[0]  # they run
         test.send_signal(number)
-        test.wait(60.0)
-        assert until(lambda: not any(map(is_running, started)))
+        assert received(started) == b''  # the last one has ended
     finally:
+        os.close(started)
         test.kill()
         test.stdin.close()
         test.wait()

@@ -290,3 +290,11 @@ __all__ = ['ARDUPILOT', 'BOTH', 'COPTER', 'LONG', 'MODES', 'PX4', 'AuthorityBenc
            'N', 'S', 'Store', 'armed_by_us', 'delay_one_command', 'flown_up_by_pilot', 'flying',
            'in_flight', 'is_command', 'lose_command', 'lost', 'on_ground', 'sends_no_command',
            'set_mode', 'status_is', 'suspended', 'upload_by_another']
+
+
+def flying_with_pilot(kind):
+    """A vehicle in flight that a pilot has taken."""
+    bench = flying(kind, 'ABC')
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.run(lambda: bench.authority() is AuthorityState.LOST, 20.0)
+    return bench

@@ -4,7 +4,7 @@ import dataclasses
 import math
 
 import pytest
-from authority_bench import MODES
+from authority_bench import flying_with_pilot
 from findings_bench import drop_messages, listed
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
@@ -95,9 +95,7 @@ def test_a_hold_in_the_climb_waits_for_its_end(kind):
 
 @BOTH
 def test_without_authority_nothing_is_sent_and_the_reason_is_logged(kind):
-    bench = flying(kind, 'ABC')
-    bench.vehicles[1].rc_mode(MODES[kind].stick)
-    assert bench.run(lambda: bench.authority() is AuthorityState.LOST, 20.0)
+    bench = flying_with_pilot(kind)
     before = len(bench.line.sent('COMMAND_LONG'))
     hold(bench)
     bench.run(limit=20.0)

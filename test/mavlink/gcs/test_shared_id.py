@@ -3,7 +3,7 @@
 import dataclasses
 
 import pytest
-from authority_bench import MODES
+from authority_bench import flying_with_pilot
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 from test_operator_hold import is_held
@@ -54,9 +54,7 @@ def test_a_list_from_before_is_not_transferred(kind):
 
 @BOTH
 def test_one_that_a_pilot_has_is_left_to_him(kind):
-    bench = flying(kind, 'ABC')
-    bench.vehicles[1].rc_mode(MODES[kind].stick)
-    assert bench.run(lambda: bench.authority() is AuthorityState.LOST, 20.0)
+    bench = flying_with_pilot(kind)
     sent = len(bench.line.sent('COMMAND_LONG'))
     run_shared(bench, 20.0)
     assert len(bench.line.sent('COMMAND_LONG')) == sent
