@@ -20,10 +20,10 @@ from uav_task_alloc.allocator.replan_records import ReplanAnswer, ReplanProblem
 from uav_task_alloc.allocator.replanning.accepted_lists import accepted_lists, plan_of_lists
 from uav_task_alloc.allocator.replanning.approvals import Approvals
 from uav_task_alloc.allocator.replanning.battery_changes import BatteryChanges
+from uav_task_alloc.allocator.replanning.built_lists import BuiltLists
 from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
-from uav_task_alloc.allocator.replanning.lists_to_publish import holding_plan
-from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
+from uav_task_alloc.allocator.replanning.lists_to_publish import lists_to_publish, plan_to_publish
 from uav_task_alloc.allocator.replanning.planning import replan_problem
 from uav_task_alloc.allocator.replanning.proposal import split_plan
 from uav_task_alloc.allocator.replanning.schedule import Schedule
@@ -246,7 +246,8 @@ class Allocator:
             if world.fleet.usable_ids() or waiting_uavs(world, stamp):
                 return replan_problem(world, self._best, trigger, background=False, stamp=stamp,
                                       outlook=self.waiting.outlook(stamp))
-            self._apply(Plan({}), trigger, True, now, stamp)
+            self._apply(Plan({}), lists_to_publish(world, Plan({}), stamp), trigger, True,
+                        now, stamp)
             schedule.end(now)
         elif (params.background_budget > 0.0 and schedule.rested(now, params.background_period)
               and world.fleet.usable_ids() and world.tasks.open() and not self.approvals.quiet):
@@ -280,19 +281,18 @@ class Allocator:
         if now - self._learned_saved >= _LEARNED_PERIOD:
             self._learned_saved = now
             self.world.mark_unsaved('learner')
-        accepted = accepted_plan(answer, self.world.params.replan_margin)
-        plans = (accepted, answer.repaired) if answer.covered is None else (
-            answer.covered, accepted, answer.repaired)
-        chosen = replace(holding_plan(self.world, plans, stamp),
-                         iterations=answer.best.iterations,
+        plan, built = plan_to_publish(self.world, answer, stamp)
+        chosen = replace(plan, iterations=answer.best.iterations,
                          solve_time=answer.repaired.solve_time + answer.best.solve_time,
                          warm_started=any(answer.problem.published.routes.values()))
-        self._apply(chosen, answer.problem.trigger, not answer.problem.background, now, stamp)
+        self._apply(chosen, built, answer.problem.trigger, not answer.problem.background, now,
+                    stamp)
 
-    def _apply(self, chosen: Plan, trigger: str, always: bool, now: float, stamp: float) -> None:
+    def _apply(self, chosen: Plan, built: BuiltLists, trigger: str, always: bool, now: float,
+               stamp: float) -> None:
         """Put the lists of a plan in force; `always` publishes an allocation without changes."""
         world = self.world
-        split = split_plan(world, chosen, trigger, stamp)
+        split = split_plan(world, chosen, built, trigger, stamp)
         why = self.approvals.propose(split.proposal)
         split.built.left_out.update(dict.fromkeys(split.waiting, why))
         published = self._publisher.put_permitted(split.built, chosen, now, stamp)

@@ -55,7 +55,7 @@ def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
     return replace(chosen, cost=cost + answer.problem.objective.response * waited)
 
 
-class _UavCost(NamedTuple):
+class UavCost(NamedTuple):
     """What the route of a UAV adds to the cost of a plan."""
 
     metres: float  # with a penalty for what exceeds its range
@@ -87,27 +87,33 @@ class _CombinedCosts:
 
     def of(self, changed: Collection[str], only: Collection[str] | None = None) -> float:
         """Return the cost with the changed UAVs as in the best plan; only: UAVs that count."""
-        return _cost_of(self._answer.problem, [
+        return cost_of_routes(self._answer.problem, [
             (self._after if uav_id in changed else self._before)[uav_id]
             for uav_id in self._before if only is None or uav_id in only], self._total)
 
 
 def _uav_costs(problem: ReplanProblem, plan: Plan,
-               only: Collection[str] | None = None) -> dict[str, _UavCost]:
+               only: Collection[str] | None = None) -> dict[str, UavCost]:
     """What each UAV adds to the cost of a plan, in the order of the problem."""
     paths = {task.id: task.path_length for task in problem.tasks}
     value = {task.id: task.value for task in problem.tasks}
     times = Timetable() if problem.objective.is_shortest else plan.timetable()
     starts, late = times.starts, times.late
-    return {uav.id: _UavCost(
+    return {uav.id: UavCost(
         _length_with_penalty(plan, uav.id, uav.range, paths), times.ends.get(uav.id, -math.inf),
         [value[task] * starts[task] for task in plan.routes.get(uav.id, ()) if task in starts],
         [late[task] for task in plan.routes.get(uav.id, ()) if task in late])
         for uav in problem.uavs if only is None or uav.id in only}
 
 
-def _cost_of(problem: ReplanProblem, costs: Collection[_UavCost], total: float) -> float:
-    """The cost of the objective of routes; total: value of all tasks."""
+def cost_of_routes(problem: ReplanProblem, costs: Collection[UavCost], total: float) -> float:
+    """Return the cost of the objective of routes, in which tasks wait from now on.
+
+    Args:
+        problem: with the objective.
+        costs: of the UAVs.
+        total: value of all tasks.
+    """
     prices, metres = problem.objective, sum(each.metres for each in costs)
     if prices.is_shortest:
         return prices.cost(metres)
@@ -128,8 +134,8 @@ def plan_cost(problem: ReplanProblem, plan: Plan, only: Collection[str] | None =
     Returns:
         The cost, with a penalty for what exceeds ranges.
     """
-    return _cost_of(problem, _uav_costs(problem, plan, only).values(),
-                    math.fsum(task.value for task in problem.tasks))
+    return cost_of_routes(problem, _uav_costs(problem, plan, only).values(),
+                          math.fsum(task.value for task in problem.tasks))
 
 
 def exchange_groups(before: Mapping[str, tuple[str, ...]],

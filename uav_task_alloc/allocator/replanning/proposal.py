@@ -27,7 +27,8 @@ class SplitPlan:
     waiting: frozenset[str] = frozenset()  # tasks that only the proposal has in a list
 
 
-def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitPlan:
+def split_plan(world: World, chosen: Plan, built: BuiltLists, trigger: str,
+               stamp: float) -> SplitPlan:
     """Divide a plan by what needs the approval of an operator.
 
     Never held up are lists that cannot be flown on as they are (a zone, a lost UAV, a battery, an
@@ -37,13 +38,13 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
     Args:
         world: as it is now.
         chosen: plan, for this world or an earlier one.
+        built: its lists, see `lists_to_publish`.
         trigger: what required it.
         stamp: [s] clock of the node.
 
     Returns:
         Lists to publish, and a proposal.
     """
-    built = lists_to_publish(world, chosen, stamp)
     if world.params.approval == 'none':
         return SplitPlan(built, '', None)
     before = present_routes(world, world.lists_in_force())
