@@ -12,7 +12,7 @@ from uav_task_alloc.geometry.polygon import XY, signed_area
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.zone_codec import OUTSIDE_AREA
 
-_MOST_CORNERS = 20
+MOST_AREA_CORNERS = 20
 _REACH = 1e6  # [m] from the area: farther than any UAV would fly around its outside
 AreaCorners = tuple[XY, ...]  # [m]
 
@@ -49,8 +49,8 @@ def check_fence_area(corners: Sequence[XY]) -> AreaCorners:
     Raises:
         InvalidValue: there are more than 20, or the polygon is not simple.
     """
-    if len(corners) > _MOST_CORNERS:
-        raise InvalidValue('fence_area', len(corners), f'at most {_MOST_CORNERS} corners')
+    if len(corners) > MOST_AREA_CORNERS:
+        raise InvalidValue('fence_area', len(corners), f'at most {MOST_AREA_CORNERS} corners')
     checked = check_polygon('fence_area', corners)
     return checked if signed_area(checked) > 0.0 else checked[::-1]
 

@@ -5,10 +5,12 @@ The format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats
 """
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from uav_task_alloc.errors import AllocError, damage, shown
-from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.geometry.fence_area import MOST_AREA_CORNERS
+from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.map_files.elements import (
     ABOVE_ORIGIN,
     AMSL,
@@ -25,6 +27,7 @@ from uav_task_alloc.map_files.qgc_complex import ABOVE_TERRAIN, ALTITUDE_MODES, 
 # MAVLink commands of items; no numbers of pymavlink, which is not loaded for the planner
 TASK_COMMANDS = {16: 'waypoint', 19: 'loiter for a time', 82: 'spline waypoint'}  # param1: seconds
 _NOT_TASKS = {20: 'return', 21: 'landing', 22: 'take-off'}  # the bridge makes its own
+_WIDEST = 1e5  # [m] radius of a circle that includes
 ITEM_FRAMES = {0: AMSL, 5: AMSL, 3: ABOVE_ORIGIN, 6: ABOVE_ORIGIN}  # MAV_FRAME
 
 
@@ -37,7 +40,8 @@ def read_plan(document: Any, file: str) -> MapFile:
 
     Returns:
         A point for each waypoint, a polygon for each survey, lines for each corridor, a zone for
-        each excluding fence; `origin` is the planned home.
+        each excluding fence, an area for each including one, circles last; `origin` is the
+        planned home.
 
     Raises:
         MapFileError: it is no .plan, or a value is of another kind.
@@ -49,10 +53,15 @@ def read_plan(document: Any, file: str) -> MapFile:
         for number, item in enumerate(document['mission']['items'], 1):
             _read_item(item, f'{file}: item {number}', read)
         fence = document.get('geoFence') or {}
-        for number, circle in enumerate(fence.get('circles', ()), 1):
-            _read_circle(circle, f'{file}: fence circle {number}', number, read)
+        circles = list(enumerate(fence.get('circles', ()), 1))
+        for number, circle in circles:
+            if not circle.get('inclusion'):
+                _read_circle(circle, f'{file}: fence circle {number}', number, read)
         for number, polygon in enumerate(fence.get('polygons', ()), 1):
             _read_polygon(polygon, f'{file}: fence polygon {number}', number, read)
+        for number, circle in circles:  # the area is a polygon that includes, where there is one
+            if circle.get('inclusion'):
+                _read_area(circle, f'{file}: fence circle {number}', read)
     except (AttributeError, LookupError, TypeError, ValueError, OverflowError) as error:
         if isinstance(error, AllocError):
             raise
@@ -101,15 +110,29 @@ def why_no_task(command: int) -> str:
 
 
 def _read_circle(circle: dict[str, Any], where: str, number: int, read: MapFile) -> None:
-    if circle.get('inclusion'):
-        read.left_out.append(f'{where}: it includes: expected an excluding one, or a polygon')
-        return
     latitude, longitude = circle['circle']['center']
     own = own_values(where, circle)
     read.elements.append(Element(
         where, str(own.pop('id', f'circle_{number}')), 'circle',
         (check_place(where, (longitude, latitude)),), properties=own,
         radius=float(circle['circle']['radius']), zone=True))
+
+
+def _read_area(circle: dict[str, Any], where: str, read: MapFile) -> None:
+    """Read a circle that includes as a polygon inside of it."""
+    latitude, longitude = circle['circle']['center']
+    radius = float(circle['circle']['radius'])
+    if not 0.0 < radius <= _WIDEST:
+        raise MapFileError(f'{where}: radius {shown(radius)}: expected a number in (0, '
+                           f'{_WIDEST:g}] m')
+    middle = check_place(where, (longitude, latitude))
+    angles = (math.tau * k / MOST_AREA_CORNERS for k in range(MOST_AREA_CORNERS))
+    corners = to_geodetic_batch(Origin(middle.latitude, middle.longitude), [
+        (radius * math.sin(angle), radius * math.cos(angle), 0.0) for angle in angles])
+    read.elements.append(Element(
+        where, '', 'polygon', tuple(check_place(where, (place[1], place[0]))
+                                    for place in corners.tolist()),
+        properties={'kind': 'fence_area'}, zone=True))
 
 
 def _read_polygon(polygon: dict[str, Any], where: str, number: int, read: MapFile) -> None:
