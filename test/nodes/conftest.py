@@ -11,7 +11,8 @@ import rclpy
 from ament_index_python.packages import get_package_prefix
 from ends_with_parent import end_with_parent
 from node_server import Forked, NodeServer
-from rclpy.executors import SingleThreadedExecutor
+
+from uav_task_alloc.nodes.ros.node_executor import NodeExecutor
 
 PACKAGE = 'uav_task_alloc'
 PATIENCE, LONGEST = 4.0, 240.0  # times each limit, up to [s]: a machine may be slow and loaded
@@ -108,7 +109,7 @@ class Probe:
         self.context = rclpy.Context()
         rclpy.init(context=self.context)
         self.node = rclpy.create_node(name, context=self.context, **kwargs)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor = NodeExecutor(context=self.context)
         self.executor.add_node(self.node)
 
     def until(self, condition, timeout=60.0, facts=lambda: ''):

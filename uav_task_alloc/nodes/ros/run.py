@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -23,6 +23,7 @@ from rclpy.utilities import remove_ros_args
 
 from uav_task_alloc.errors import AllocError
 from uav_task_alloc.nodes.ros.log_callers import name_callers_by_frames
+from uav_task_alloc.nodes.ros.node_executor import NodeExecutor
 from uav_task_alloc.nodes.ros.parameter_files import files_of, read_sections
 from uav_task_alloc.nodes.ros.security import enclave_of, security_warning
 from uav_task_alloc.parameter_field import CheckedParams
@@ -118,7 +119,7 @@ def _limit_end() -> None:
 
 def _spin(node: Node, threads: int, signals: list[int]) -> None:
     """Spin until `signals` is not empty; raise SystemExit CRASHED where a callback raises."""
-    executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
+    executor = NodeExecutor() if threads == 1 else MultiThreadedExecutor(threads)
     executor.add_node(node)
     delays_exit = getattr(node, 'delays_exit', lambda: False)
     try:
