@@ -34,6 +34,7 @@ LEVELS = {
     'model': 1,
     'palette': 0,
     'piece_ids': 0,
+    'quick_import': 0,
     'parameter_field': 1,
     'params': 1,
     'parameter_texts': 2,

@@ -72,10 +72,10 @@ def _status(argv: Sequence[str]) -> int:
 
 def _run(argv: Sequence[str]) -> int:
     from difflib import get_close_matches
-    from importlib import import_module
 
     from uav_task_alloc import __version__
     from uav_task_alloc.cli.options import OptionParser
+    from uav_task_alloc.quick_import import import_quickly
     parser = OptionParser(
         '', 'Online task allocation for several UAVs around no-fly zones.', 'commands:\n'
         + '\n'.join(f'  {name:8} {text}' for name, text in COMMANDS.items())
@@ -90,7 +90,7 @@ def _run(argv: Sequence[str]) -> int:
     if argv[0] not in COMMANDS:
         near = get_close_matches(argv[0], COMMANDS, 1, 0.0)[0]
         parser.error(f'{argv[0]!r}: expected one of {", ".join(COMMANDS)}; nearest is {near}')
-    command = import_module(f'uav_task_alloc.cli.{_MODULES.get(argv[0], argv[0])}')
+    command = import_quickly(f'uav_task_alloc.cli.{_MODULES.get(argv[0], argv[0])}')
     return int(command.main(argv[1:]))
 
 

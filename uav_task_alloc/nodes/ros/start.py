@@ -28,8 +28,8 @@ def start(name: str) -> None:
     # of the program, see resource/program.in: one that came before this line is handled now
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
     try:
-        from importlib import import_module
-        main = import_module(f'uav_task_alloc.nodes.{name}').main
+        from uav_task_alloc.quick_import import import_quickly
+        main = import_quickly(f'uav_task_alloc.nodes.{name}').main
     except ImportError as error:
         missing = (error.name or '').split('.')[0]
         if missing == 'uav_task_alloc':
