@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages are requested at their rates, again when missing."""
+import random
+
 import pytest
 from flight_bench import FlightBench
 from mission_bench import ORIGIN, OURS
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import PX4
-from uav_task_alloc.mavlink.gcs.message_rates import MAX_REQUESTS
+from uav_task_alloc.mavlink.gcs.message_rates import MAX_REQUESTS, MessageRates
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.telemetry_messages import RATES
+from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Codec
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
@@ -103,3 +107,23 @@ def test_a_message_is_not_late_whose_kind_is_rare_among_many_frames(others):
             receive(d.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0), second + n / others)
         receive(d.MAVLink_mission_current_message(second), second + 1.0)
         assert telemetry.mission.current == second
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_a_message_is_missed_at_the_first_step_after_its_time(seed):
+    """Most steps do not look: none may be missing yet."""
+    rng, telemetry = random.Random(seed), Telemetry(PX4, ORIGIN, 0.0)
+    rates = MessageRates(Peer(1), telemetry, 0.0)
+    last, missed = telemetry.received_last, 0
+    for k in range(2000):
+        now = 0.1 * k
+        for number, rate in RATES.items():
+            if rng.random() < 0.02 * rate and not 60.0 < now < 60.0 + 5 * (number % 7):
+                last[number] = now
+        if rng.random() < 0.002:
+            last.clear()  # as a restart of the vehicle does
+        rates.step(now)
+        silent = {n for n, rate in RATES.items() if now - last.get(n, now) > 10.0 + 4.0 / rate}
+        assert rates._silent == silent
+        missed += bool(silent)
+    assert 0 < missed < 2000

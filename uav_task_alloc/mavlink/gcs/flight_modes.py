@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from functools import lru_cache
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -78,6 +79,7 @@ _AVOIDS = {'copter': d.COPTER_MODE_AVOID_ADSB, 'plane': d.PLANE_MODE_AVOID_ADSB}
 _NAMES = {'copter': _COPTER, 'plane': _PLANE}
 
 
+@lru_cache(maxsize=256)
 def mode_class(family: str, custom_mode: int) -> ModeClass | None:
     """Classify a mode (ArduPilot mode.h, PX4 px4_custom_mode.h).
 

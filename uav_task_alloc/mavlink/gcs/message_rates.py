@@ -2,6 +2,8 @@
 """Requests the messages that the bridge needs: those it flies by until they come."""
 from __future__ import annotations
 
+import math
+
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
@@ -16,6 +18,7 @@ _PERIOD = 2.0  # [s] between requests
 MAX_REQUESTS = 5
 _SLOW = 10.0  # [s] between later requests of what is needed
 _SILENT = 10.0  # [s] plus four periods without a message that was received before
+_ROUNDING = 1e-3  # [s] more than sums of times are inexact
 _QUIET = 3.0  # [s] without a position: perhaps restarted, which only new rates show
 
 
@@ -25,6 +28,8 @@ class MessageRates:
     def __init__(self, peer: Peer, telemetry: Telemetry, now: float) -> None:
         self._peer, self._telemetry = peer, telemetry
         self._silent: set[int] = set()  # received once, and missing now
+        # until when [s] none can be missing of these rates
+        self._complete_until, self._complete = -math.inf, RATES
         self._rates: dict[int | None, dict[int, float]] = {None: RATES}  # by estimator report
         self.restart(now)
 
@@ -44,9 +49,7 @@ class MessageRates:
         if rates is None and estimate is not None:
             rates = self._rates[estimate] = {**RATES, estimate: 1.0}
         assert rates is not None
-        last = self._telemetry.received_last
-        silent = {number for number, rate in rates.items()
-                  if now - last.get(number, now) > _SILENT + 4.0 / rate}
+        silent = self._find_silent(rates, now)
         if silent - self._silent and not self._telemetry.link.stale(now):
             self.restart(now)
         self._silent = silent
@@ -66,3 +69,15 @@ class MessageRates:
             out.append(self._peer.command(d.MAV_CMD_REQUEST_MESSAGE,
                                           d.MAVLINK_MSG_ID_HOME_POSITION))
         return out
+
+    def _find_silent(self, rates: dict[int, float], now: float) -> set[int]:
+        """The messages that were received once, and are missing now."""
+        if now < self._complete_until and rates is self._complete:
+            return set()  # as at most steps
+        last = self._telemetry.received_last
+        silent = {number for number, rate in rates.items()
+                  if now - last.get(number, now) > _SILENT + 4.0 / rate}
+        soonest = min(last.get(number, now) + 4.0 / rate for number, rate in rates.items())
+        self._complete_until = -math.inf if silent else soonest + _SILENT - _ROUNDING
+        self._complete = rates
+        return silent

@@ -32,9 +32,11 @@ class Policy:
     @property
     def no_fly_zones(self) -> tuple[ThreatZone, ...]:
         """The zones, and what is outside of `fence_area`: no way of the bridge enters them."""
+        if self.fence_area is None:
+            return self.zones
         return (*self.zones, *_outside(self.fence_area))
 
 
 @lru_cache(maxsize=8)
-def _outside(area: FenceShape | None) -> tuple[ThreatZone, ...]:
-    return zones_outside(area.corners if area else ())
+def _outside(area: FenceShape) -> tuple[ThreatZone, ...]:
+    return zones_outside(area.corners)

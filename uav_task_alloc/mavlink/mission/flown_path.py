@@ -130,10 +130,15 @@ class FlownPath:
             close: tolerance [m] added to the radius where no hold is required; 0: the hold
                 must not be shorter either.
         """
-        first, last = self._stay(point, radius, since, hold > 0.0, until, close)
-        if last - first >= max(0.0, hold - (_HOLD_SLACK if close else 0.0)):
+        if self.was_at(point, radius, hold, since, until, close):
             return Visit.YES
         return Visit.UNOBSERVED if self.has_gap(since, until) else Visit.NO
+
+    def was_at(self, point: Point, radius: float, hold: float, since: float,
+               until: float = math.inf, close: float = CLOSE) -> bool:
+        """Whether `visited` returns YES."""
+        first, last = self._stay(point, radius, since, hold > 0.0, until, close)
+        return last - first >= max(0.0, hold - (_HOLD_SLACK if close else 0.0))
 
     def has_gap(self, since: float, until: float) -> bool:
         """Whether the path is unknown somewhere between two vehicle times [s]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -83,10 +84,17 @@ def located(placed: Sequence[PlacedItem], origin: Origin) -> list[Item]:
         placed: items without, and where they are.
         origin: of the ENU frame.
     """
-    points = [each.place for each in placed if each.place is not None]
-    geodetic = iter(to_geodetic_batch(origin, points).tolist())
+    geodetic = iter(_geodetic(origin, tuple(
+        each.place for each in placed if each.place is not None)))
     return [each.item if each.place is None else _at(each.item, *next(geodetic))
             for each in placed]
+
+
+@lru_cache(maxsize=32)
+def _geodetic(origin: Origin, points: tuple[Point, ...]) -> list[list[float]]:
+    """The geodetic positions of points; most lists of a flight are asked for several times."""
+    places: list[list[float]] = to_geodetic_batch(origin, points).tolist()
+    return places
 
 
 def _at(item: Item, latitude: float, longitude: float, altitude: float) -> Item:

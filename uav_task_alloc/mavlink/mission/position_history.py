@@ -38,6 +38,7 @@ class PositionHistory:
         self._doubt = -math.inf, -math.inf
         self._settling_until = -math.inf  # vehicle time [s]: it has jumped on the ground
         self._stamps: deque[tuple[int, float]] = deque(maxlen=_STAMPS)  # frame, vehicle time
+        self._in_order = 0  # how many of the last of them rise in both
         self._recorded_at: float | None = None  # vehicle time [s] of one of the previous run
         # item and since [s] of the last `was_inside`, the newest position then, how many had come
         # late when it was searched, and its result
@@ -70,6 +71,8 @@ class PositionHistory:
             self._clocks.append((now, sample.t - now))
             del self._clocks[:-_CLOCKS]
         if frame is not None:
+            last, at = self._stamps[-1] if self._stamps else (frame, math.inf)
+            self._in_order = self._in_order + 1 if frame > last and sample.t >= at else 1
             self._stamps.append((frame, sample.t))
         if newest:
             if self.path.jumps(sample):
@@ -134,8 +137,8 @@ class PositionHistory:
             until: vehicle time [s].
             close: [m] tolerance beyond the acceptance radius.
         """
-        return item.position is not None and self.path.visited(
-            item.position, item.radius, item.params[0], since, until, close) is Visit.YES
+        return item.position is not None and self.path.was_at(
+            item.position, item.radius, item.params[0], since, until, close)
 
     def was_inside(self, item: Item, since: float) -> bool:
         """Whether it was within the radius of an item, for however short a time.
@@ -150,9 +153,9 @@ class PositionHistory:
             until, late, inside = since, self.path.late, False
         if not inside and self.path.newest > until and item.position is not None:
             back = MAX_MESSAGE_DELAY if self.path.late > late else 0.0
-            inside, late = self.path.visited(
+            inside, late = self.path.was_at(
                 item.position, item.radius, 0.0, max(since, until - back),
-                close=0.0) is Visit.YES, self.path.late
+                close=0.0), self.path.late
         self._inside = (item, since), self.path.newest, late, inside
         return inside
 
@@ -244,6 +247,8 @@ class PositionHistory:
 
     def sent_between(self, frame: int) -> tuple[float, float]:
         """Vehicle times [s] between which a frame was sent, by its order among the positions."""
+        if self._in_order >= len(self._stamps) > 0 and frame > self._stamps[-1][0]:
+            return self._stamps[-1][1], math.inf  # as of most frames that were just received
         before, after = -math.inf, math.inf
         for number, t in self._stamps:
             if number < frame:
