@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The executor of a node: as rclpy's for one thread, for a third less CPU in a node that waits."""
+"""The executor of a node: as rclpy's for one thread, for less CPU where there are many topics."""
 from __future__ import annotations
 
 import time
