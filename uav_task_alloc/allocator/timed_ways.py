@@ -15,16 +15,22 @@ from uav_task_alloc.separation.prediction import HORIZON
 MOVES = 2.0  # [m/s]; with more it does not hover
 _CLIMBS = 0.5  # [m/s]; with more it does not fly level
 _TOWARDS = math.cos(math.radians(15.0))  # of the course and the direction of home
-_CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
+_CLIMBS_ON = 5.0  # [s] for which a take-off to an unknown height goes on at least
 TimedPoints = list[tuple[float, Point]]  # [s] from now, and [m] ENU
 
 
 def top_of_climb(record: UavRecord, height: float) -> Point:
-    """Where a take-off ends: the bridge climbs to its own height, whatever the leg."""
+    """Where a take-off ends: at the height that the bridge reports, whatever the leg.
+
+    One that is above that, or reports none, climbs on for some seconds.
+    """
     x, y, z = record.report.position
     rise = (record.report.velocity or (0.0, 0.0, 0.0))[2]
-    top = record.report.takeoff_height or BridgeParams.cruise_altitude
-    return x, y, max(z + _CLIMBS_ON * rise, height, record.home[2] + top)
+    known = record.report.takeoff_height
+    top = record.home[2] + (known or BridgeParams.cruise_altitude)
+    if known and z < top:
+        return x, y, top
+    return x, y, max(z + _CLIMBS_ON * rise, top if known else max(top, height))
 
 
 def timed_along(points: TimedPoints, line: Sequence[Point], pace: FlightPace,
