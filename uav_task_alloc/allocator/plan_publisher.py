@@ -61,8 +61,7 @@ class PlanPublisher:
             if text not in self._together:
                 world.note(text, warning=True)
         self._together = built.together
-        self.left_out = {task_id: world.deadlines.left_out(task_id, reason, stamp)
-                         for task_id, reason in built.left_out.items()}
+        self.left_out = world.deadlines.left_out(built.left_out, stamp)
         self._passes = self._next_latest(stamp)
         published = world.publish(built.lists, stamp)
         self._limiter.published(published, now)
@@ -99,10 +98,10 @@ class PlanPublisher:
         """Say of tasks that are left out that their latest has passed, where that is so now."""
         if stamp <= self._passes:
             return
-        for task_id, why in self.left_out.items():
-            record = self._world.task_records().get(task_id)
-            if record is not None and record.task.latest < stamp:
-                self.left_out[task_id] = self._world.deadlines.left_out(task_id, why, stamp)
+        records = self._world.task_records()
+        self.left_out |= self._world.deadlines.left_out({
+            task_id: why for task_id, why in self.left_out.items()
+            if task_id in records and records[task_id].task.latest < stamp}, stamp)
         self._passes = self._next_latest(stamp)
         self.step_tasks(stamp)
         self._world.outbox.statuses = True

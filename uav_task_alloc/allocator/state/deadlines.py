@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 
-from uav_task_alloc.allocator.list_records import ListStop, UavList
-from uav_task_alloc.allocator.records import TaskRecord, TaskVerdict, UavReport
+from uav_task_alloc.allocator.list_records import UavList
+from uav_task_alloc.allocator.records import TaskRecord, TaskVerdict
+from uav_task_alloc.allocator.state.earliest_starts import EarliestStarts
 from uav_task_alloc.allocator.state.fleet import Fleet, may_fly
 from uav_task_alloc.allocator.state.flight_pace import FlightPace
 from uav_task_alloc.allocator.state.flights import Flights
-from uav_task_alloc.allocator.state.stop_times import timed_stops
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
-from uav_task_alloc.model import Leg, Task
+from uav_task_alloc.model import Task
 from uav_task_alloc.timetable import clock_text
 
 _LATE = 0.25  # [s] after its latest that is no rounding
@@ -71,12 +70,13 @@ class Deadlines:
             del self.texts[name], self._late[name]
         worse = [name for name, over in late.items()
                  if name not in self._late or abs(over - self._late[name]) > _MORE]
-        reports = []
+        reports, starts = [], self._starts(stamp)
         for name in worse:
             if late[name] > self._late.get(name, 0.0):
                 reports.append(f'{name} would start {max(1.0, late[name]):.0f} s late')
             self._late[name] = late[name]
-            self.texts[name] = self._text(self._tasks.records[name], found[name], stamp)
+            self.texts[name] = self._text(self._tasks.records[name], found[name], starts,
+                                          stamp)
         return news or bool(worse or in_time), reports
 
     def _news(self, name: str, start: float, stamp: float) -> float:
@@ -128,85 +128,53 @@ class Deadlines:
             return (f'latest {clock_text(task.latest, stamp)} is '
                     f'{duration_text(stamp - task.latest)} in the past: it is '
                     f'{clock_text(stamp, stamp)}')
-        start, uav_id = self._earliest(task, (), stamp, stamp, at_best=True,
-                                       enough=task.latest + _LATE)
+        start, uav_id = self._least_start(task, stamp, task.latest + _LATE)
         if uav_id and start > task.latest + _LATE:
             return (f'latest {clock_text(task.latest, stamp)} cannot be kept: the earliest '
                     f'possible start is {clock_text(start, stamp)} ({uav_id})')
         return ''
 
-    def _earliest(self, task: Task, failed_on: tuple[str, ...], stamp: float, begin: float,
-                  usable: bool | None = None, at_best: bool = False,
-                  enough: float = -math.inf) -> tuple[float, str]:
-        """The earliest start of a task that is flown first and straight, and by which UAV.
+    def _least_start(self, task: Task, stamp: float, enough: float) -> tuple[float, str]:
+        """The start of a task by the UAV that could be first, with nothing lost to stops or wind.
 
-        usable: of UAVs that may be given tasks (True), may not (False), or all; at_best: with
-        nothing lost at stops or to the wind; enough: the first start that is not later will do.
+        enough: [s]; the first start that is not later will do.
         """
         best = math.inf, ''
+        places = (task.position, task.end) if task.reversible else (task.position,)
         for uav_id, record in self._fleet.records.items():
-            if not may_fly(task, failed_on, record.report) or (usable is not None and (
-                    self._fleet.usable(uav_id) != usable
-                    or not self._has_payload(task, record.report))):
+            if not may_fly(task, (), record.report):
                 continue
             pace = self._flights.pace(uav_id)
-            if at_best:
-                speed = max(pace.speed, record.report.cruise_speed or 0.0)
-                pace = FlightPace(speed + math.hypot(*pace.wind), pace.climb, pace.descent)
-            places = (task.position, task.end) if task.reversible else (task.position,)
+            speed = max(pace.speed, record.report.cruise_speed or 0.0)
+            pace = FlightPace(speed + math.hypot(*pace.wind), pace.climb, pace.descent)
             seconds = min(pace.seconds((record.report.position, place)) for place in places)
-            start = max(max(begin, task.release) + seconds, task.earliest)
-            if not at_best and start < best[0]:
-                start = self._first_start(task, uav_id, begin)
-            best = min(best, (start, uav_id))
+            best = min(best, (max(max(stamp, task.release) + seconds, task.earliest), uav_id))
             if best[0] <= enough:
                 break
         return best
 
-    def _first_start(self, task: Task, uav_id: str, stamp: float) -> float:
-        """When a known UAV is predicted to start a task that it flies first and straight."""
-        flight = self._flights.of(uav_id, stamp)
-        assert flight is not None
-        stop = ListStop(task, Leg((), 0.0), 0.0)
-        ways = (stop, replace(stop, reversed=True)) if task.reversible else (stop,)
-        return stamp + min(timed_stops((way,), flight)[0].start for way in ways)
+    def _starts(self, stamp: float) -> EarliestStarts:
+        return EarliestStarts(self._tasks, self._fleet, self._flights, stamp)
 
-    def _has_payload(self, task: Task, report: UavReport) -> bool:
-        """Whether a UAV has the payload of an accepted task on board, or could take it on."""
-        return task.payload == 0.0 or self._tasks.records[task.id].uav == report.uav_id or (
-            report.standby and task.payload <= (report.payload_capacity or 0.0))
-
-    def _text(self, record: TaskRecord, start: float, stamp: float) -> str:
+    def _text(self, record: TaskRecord, start: float, starts: EarliestStarts, stamp: float) -> str:
         """Why a listed task is late, by how much, and what would help."""
         task = record.task
         late = max(1.0, start - task.latest)
         return (f'expected {clock_text(start, stamp)}, {late:.0f} s after its latest '
-                f'{clock_text(task.latest, stamp)}; {self._help(record, stamp)}')
+                f'{clock_text(task.latest, stamp)}; {_help(record, starts, stamp)}')
 
-    def _help(self, record: TaskRecord, stamp: float) -> str:
-        task = record.task
-        first, uav_id = self._earliest(task, record.failed_on, stamp, stamp, usable=True)
-        if first <= task.latest:
-            return (f'{uav_id} could start it at {clock_text(first, stamp)} if it flew it first')
-        other, other_id = self._earliest(task, record.failed_on, stamp, stamp, usable=False)
-        if other <= task.latest:
-            return (f'{other_id} could start it at {clock_text(other, stamp)} if it were '
-                    'available')
-        if math.isinf(min(first, other)):
-            return ('no UAV on the ground can carry it' if task.payload > 0.0 else
-                    'no UAV that may fly it is known')
-        start, uav_id = min((first, uav_id), (other, other_id))
-        return (f'no UAV can start it before {clock_text(start, stamp)} ({uav_id}); an update '
-                'with a later `latest` would help')
-
-    def left_out(self, task_id: str, reason: str, stamp: float) -> str:
-        """Return why a task with a deadline is in no list, with times of the ROS clock.
+    def left_out(self, reasons: Mapping[str, str], stamp: float) -> dict[str, str]:
+        """Return why tasks are in no list; of those with a deadline with times of the ROS clock.
 
         Args:
-            task_id: of an accepted task.
-            reason: of the solver, in seconds from now.
+            reasons: of the solver, in seconds from now, by task id.
             stamp: [s] of the problem that was solved.
         """
+        starts = self._starts(stamp)
+        return {task_id: self._left_out(task_id, reason, starts, stamp)
+                for task_id, reason in reasons.items()}
+
+    def _left_out(self, task_id: str, reason: str, starts: EarliestStarts, stamp: float) -> str:
         record = self._tasks.records.get(task_id)
         if record is None or math.isinf(record.task.latest):
             return reason
@@ -216,11 +184,29 @@ class Deadlines:
 
         latest = clock_text(record.task.latest, stamp)
         if _ARRIVAL.match(reason):
-            return f'latest {latest} cannot be kept: {self._help(record, stamp)}'
+            return f'latest {latest} cannot be kept: {_help(record, starts, stamp)}'
         reason = _EACH.sub(lambda found: f'arrives at '
                            f'{clock_text(stamp + float(found[1]), stamp)}, its latest is {latest}',
                            reason)
-        return f'{reason}; {self._help(record, stamp)}'
+        return f'{reason}; {_help(record, starts, stamp)}'
+
+
+def _help(record: TaskRecord, starts: EarliestStarts, stamp: float) -> str:
+    """What would help a task that is too late."""
+    task = record.task
+    first, uav_id = starts.first(task, record.failed_on, usable=True)
+    if first <= task.latest:
+        return (f'{uav_id} could start it at {clock_text(first, stamp)} if it flew it first')
+    other, other_id = starts.first(task, record.failed_on, usable=False)
+    if other <= task.latest:
+        return (f'{other_id} could start it at {clock_text(other, stamp)} if it were '
+                'available')
+    if math.isinf(min(first, other)):
+        return ('no UAV on the ground can carry it' if task.payload > 0.0 else
+                'no UAV that may fly it is known')
+    start, uav_id = min((first, uav_id), (other, other_id))
+    return (f'no UAV can start it before {clock_text(start, stamp)} ({uav_id}); an update '
+            'with a later `latest` would help')
 
 
 def duration_text(seconds: float) -> str:
