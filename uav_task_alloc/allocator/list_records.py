@@ -54,6 +54,15 @@ class ListStop:
         """Length of the leg and of the path [m]."""
         return self.leg.length + self.task.path_length
 
+    def timed(self, eta: float, wait: float, served: float, path_time: float) -> ListStop:
+        """Return the stop with other times; `replace` takes three times as long.
+
+        Args:
+            eta, wait, served, path_time: [s], see the class.
+        """
+        return ListStop(self.task, self.leg, eta, wait, served, self.begin_after, self.reversed,
+                        path_time)
+
     @property
     def start(self) -> float:
         """Start of the service [s] from the stamp of the list; negative once it has begun."""

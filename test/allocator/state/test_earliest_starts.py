@@ -46,8 +46,8 @@ def test_the_first_start_is_that_of_the_uav_that_would_be_first_if_each_was_trie
     tried = 0
     for task in tasks(seed):
         for usable in (True, False):
-            able = [uav_id for uav_id in world.fleet.records if world.fleet.usable(uav_id) == usable
-                    and (task.allowed_uavs is None or uav_id in task.allowed_uavs)]
+            able = [uav_id for uav_id in task.allowed_uavs or world.fleet.records
+                    if world.fleet.usable(uav_id) == usable]
             each = [(stamp + timed_stops((ListStop(task, Leg((), 0.0), 0.0),), world.flights.of(
                 uav_id, stamp))[0].start, uav_id) for uav_id in able]
             assert starts.first(task, (), usable) == min(each, default=(float('inf'), ''))

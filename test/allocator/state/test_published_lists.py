@@ -225,3 +225,18 @@ def test_lists_that_exchange_a_task_are_published_together_or_deferred():
     assert not limiter.due(12.0)
     assert limiter.permitted(held, new, never, 11.0, 1.0) == new
     assert limiter.permitted(held, new, {'a'}.__contains__, 10.4, 1.0) == new
+
+
+def test_times_of_a_list_are_computed_once_for_a_flight_and_again_when_the_uav_has_moved(driver):
+    driver.settle()
+    lists, flights = driver.world.lists, driver.world.flights
+
+    def timed():
+        return lists.restamped('a', driver.now, flights.of('a', driver.now))
+
+    before = timed()
+    assert timed() is before
+    driver.uav('a', 50.0, 0.0, 50.0)
+    assert timed().stops[0].eta < before.stops[0].eta
+    driver.now += 1.0
+    assert timed().stamp == before.stamp + 1.0

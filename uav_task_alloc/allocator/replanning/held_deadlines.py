@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 
 from uav_task_alloc.allocator.list_records import UavList
 from uav_task_alloc.allocator.replan_records import ReplanProblem
@@ -38,15 +39,16 @@ def held_lists(world: World, new: Mapping[str, UavList],
     kept = {name: (uav_id, start) for uav_id, each in old.items()
             for name, start in promised_starts(each, stamp).items() if world.tasks.is_open(name)}
     after = {stop.task.id: stamp + stop.start for each in new.values() for stop in each.stops}
+    must_change = cache(world.must_change)  # asked for each task
     broken = [name for name, (uav_id, start) in kept.items()
               if after.get(name, math.inf) > start + _ROUNDING
               and after.get(name, math.inf) > _latest(old[uav_id], name)
-              and not world.must_change(uav_id)]
+              and not must_change(uav_id)]
     lists, reasons = dict(new), dict[str, str]()
     for group in exchange_groups(_routes(old), _routes(new)) if broken else ():
         names = sorted(name for name in broken if kept[name][0] in group)
         back = {uav_id for uav_id in group if world.usable(uav_id)}
-        if not names or any(old[uav_id].stops and world.must_change(uav_id) for uav_id in back):
+        if not names or any(old[uav_id].stops and must_change(uav_id) for uav_id in back):
             continue
         for uav_id in back:
             reasons.update((name, _REASON.format(names[0])) for name in new[uav_id].task_ids)

@@ -83,7 +83,7 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
             old = None
         leg = _steady_leg(old, before == _START, place, paths, _planned_leg(
             legs, _leg_key(uav.id, before, task.id), place, new.entry, paths), keep, velocity)
-        if leg is None or not paths.clear(*new.way):
+        if leg is None or (task.path and not paths.clear(*new.way)):
             why = paths.why_no_leg(place, new.entry) if leg is None else ''
             unreachable[task.id] = f'no safe path for {uav.id}' + (f': {why}' if why else '')
             continue
@@ -131,8 +131,11 @@ def _steady_leg(stop: ListStop | None, first: bool, place: Point, paths: SafePat
         return Leg((), 0.0)
     if first:
         metres = paths.rest_of_leg(place, old, stop.entry, velocity)
+    elif (fresh is not None and fresh.via == old.via) or paths.leg_clear(
+            place, *old.via, stop.entry):
+        metres = old.length
     else:
-        metres = old.length if paths.leg_clear(place, *old.via, stop.entry) else None
+        metres = None
     if metres is None:
         return fresh
     if fresh is None:

@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from uav_task_alloc.geometry.box_grid import BoxGrid
 from uav_task_alloc.geometry.detour import Detour, find_detour
 from uav_task_alloc.geometry.obstacles import Floats, Obstacles, blocked, pack
 from uav_task_alloc.geometry.polyline import points_passed, polyline_length
@@ -47,7 +48,8 @@ class ZonePaths:
         self._wide = pack(self.zones, 0.5 * params.clearance)
         self._planned = pack(self.zones, params.clearance)
         self._low, self._high = _boxes(self._wide)
-        self._planned_boxes = _boxes(self._planned)
+        self._wide_grid, self._planned_grid = (BoxGrid(*_boxes(each)) for each in (
+            self._wide, self._planned))
 
     def leg(self, a: Point, b: Point) -> Leg | None:
         """Return the shortest safe leg from a to b; None if none was found in the budget."""
@@ -91,14 +93,12 @@ class ZonePaths:
                      if blocked(rows[k], *point, *top, -np.inf, True)), '')
 
     def clear(self, *points: Point) -> bool:
-        """Return whether a polyline enters no zone. O(zones) a segment, mostly box tests."""
-        return not self.zones or not any(
-            _cut(self._wide, self._low, self._high, a, b) for a, b in pairwise(points))
+        """Return whether a polyline enters no zone. O(zones near) a segment."""
+        return not (self.zones and _cut(self._wide, self._wide_grid, points))
 
     def planned_clear(self, *points: Point) -> bool:
         """Return whether a polyline keeps the whole clearance from all zones."""
-        return not self.zones or not any(
-            _cut(self._planned, *self._planned_boxes, a, b) for a, b in pairwise(points))
+        return not (self.zones and _cut(self._planned, self._planned_grid, points))
 
     def leg_clear(self, *points: Point) -> bool:
         """Return whether a leg with these points is safe: it enters no zone."""
@@ -134,8 +134,11 @@ def _boxes(obstacles: Obstacles) -> tuple[Floats, Floats]:
             np.stack([rows['x1'], rows['y1'], rows['z1']], axis=1))
 
 
-def _cut(obstacles: Obstacles, low: Floats, high: Floats, a: Point, b: Point) -> bool:
-    """Whether a segment enters an obstacle."""
-    near = ((np.maximum(a, b) >= low) & (np.minimum(a, b) <= high)).all(axis=1)
+def _cut(obstacles: Obstacles, grid: BoxGrid, points: Sequence[Point]) -> bool:
+    """Whether a polyline enters an obstacle."""
     rows = obstacles.rows
-    return any(blocked(rows[k], *a, *b, -np.inf, True) for k in np.flatnonzero(near))
+    for a, b in pairwise(points):
+        for k in grid.near(a, b):
+            if blocked(rows[k], *a, *b, -np.inf, True):
+                return True
+    return False

@@ -39,6 +39,8 @@ class PublishedLists:
         self._revision_floor = 0
         # (UAV, task) -> first and last revision that contained the task
         self._contained: dict[tuple[str, str], tuple[int, int]] = {}
+        # by UAV the list in force, its flight, and the list with times by that
+        self._restamped: dict[str, tuple[UavList, UavFlight, UavList]] = {}
 
     def get(self, uav_id: str) -> UavList:
         """Return the list in force; one of revision 0 where none was ever published.
@@ -153,9 +155,15 @@ class PublishedLists:
             flight: of the UAV now; None: unknown, and it flies as planned.
         """
         published = self.get(uav_id)
-        stops = timed_stops(published.stops, flight) if flight else _later(
-            published.stops, min(0.0, published.stamp - stamp))
-        return replace(published, stops=stops, stamp=stamp)
+        if flight is None:
+            return replace(published, stamp=stamp, stops=_later(
+                published.stops, min(0.0, published.stamp - stamp)))
+        known = self._restamped.get(uav_id)  # it is asked for several times in a step
+        if known is not None and known[0] is published and known[1] == flight:
+            return known[2] if known[2].stamp == stamp else replace(known[2], stamp=stamp)
+        timed = replace(published, stops=timed_stops(published.stops, flight), stamp=stamp)
+        self._restamped[uav_id] = published, flight, timed
+        return timed
 
     def without_ended(self, uav_id: str, ended: Callable[[str], bool], stamp: float,
                       flight: UavFlight | None) -> UavList:
@@ -191,6 +199,7 @@ class PublishedLists:
     def forget_uav(self, uav_id: str) -> None:
         """Remove a UAV; if it reports again its revisions still increase."""
         self._on_board.pop(uav_id, None)
+        self._restamped.pop(uav_id, None)
         self.to_resend.discard(uav_id)
         published = self.lists.pop(uav_id, None)
         if published is None:

@@ -32,15 +32,13 @@ def timed_stops(stops: Sequence[ListStop], flight: UavFlight,
         task, earliest = stop.task, max(stop.task.earliest, stop.begin_after)
         if k == 0 and flight.serving == task.id:
             since = flight.stamp - earliest  # negative: it waits
-            timed.append(replace(stop, eta=0.0, wait=max(0.0, -since),
-                                 served=max(0.0, min(flight.served, since)),
-                                 path_time=_rest_of_path(stop, flight)))
+            timed.append(stop.timed(0.0, max(0.0, -since), max(0.0, min(flight.served, since)),
+                                    _rest_of_path(stop, flight)))
         else:
             clock = max(clock, task.release - flight.stamp)
             clock += _leg_seconds(stop, flight, place, start, first=k == 0)
-            timed.append(replace(stop, eta=clock, served=0.0,
-                                 wait=max(0.0, earliest - flight.stamp - clock),
-                                 path_time=seconds_along(stop, flight.pace)))
+            timed.append(stop.timed(clock, max(0.0, earliest - flight.stamp - clock), 0.0,
+                                    seconds_along(stop, flight.pace)))
         clock, place = timed[-1].finish, stop.exit
     return tuple(timed)
 
