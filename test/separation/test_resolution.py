@@ -287,3 +287,10 @@ def test_one_that_stays_in_the_air_without_a_leg_is_flown_around(first):
     pair = (flight('a', (0, 0, 30), (FAR, 0, 30)), Flight('b', (), (200, 0, 30), 10.0, 2.5, 1.5))
     result = checked(*(pair if first else pair[::-1]))
     assert [each.resolution for each in result.conflicts] == ['height']
+
+
+@pytest.mark.parametrize('name', ['crossing', 'head-on'])
+def test_between_limits_that_leave_room_for_one_more_layer_exactly_that_is_used(name):
+    result = checked(*ENCOUNTERS[name], limits=TransitLimits(30.0, 35.0))
+    assert {each.resolution for each in result.conflicts} == {'height'}
+    assert all(leg.hold_until == -math.inf for each in result.flights for leg in each.legs)

@@ -102,6 +102,9 @@ def other_heights(flight: Flight, leg: FlightLeg, rule: Separation,
     ends = ends or [max(point[2] for point in points)]
     levels = {max(ends), min(ends), *(
         max(ends) + step * (rule.vertical + _MARGIN) for step in range(1, _LAYERS + 1))}
+    above = max(ends) + rule.vertical
+    if above <= limits.altitude_max < above + _MARGIN:
+        levels.add(above)  # the only other layer
     for level in levels:
         if not limits.altitude_min <= level <= limits.altitude_max:
             continue
