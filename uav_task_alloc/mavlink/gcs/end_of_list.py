@@ -91,7 +91,7 @@ class EndOfList:
         awaited = 'an upload that does not end'
         if self.held_at_zone() and self._onboard.verified():  # the zone is newer
             awaited, self._given_up = 'a list around a zone', self._list_and_zones()
-        blocked = self._blocked_home()
+        blocked = self.blocked_home()
         if blocked:
             self.alarm = f'held for {awaited}, and {blocked}: stays'
             self._notes.append(OperatorNote('error', self.alarm))
@@ -146,7 +146,7 @@ class EndOfList:
             return None  # the straight path home crosses a zone: fly the list with the detour
         if tasks.waits and self._policy().when_empty == 'hold':
             return None  # fly to where it waits for tasks
-        blocked = self._blocked_home() if returns else ''
+        blocked = self.blocked_home() if returns else ''
         if blocked and telemetry.mode is not ModeFunction.RETURN:
             returns = False
             self._sender.wait(f'a path home: {blocked}')
@@ -185,7 +185,7 @@ class EndOfList:
         sent_at = self._sender.current_set_at.get(seq, -math.inf)
         return now - sent_at < MAX_MESSAGE_DELAY and not (acknowledged and sent_at == since)
 
-    def _blocked_home(self) -> str:
+    def blocked_home(self) -> str:
         """Why it must not fly straight home; '': it may."""
         telemetry, zones = self._telemetry, self._policy().no_fly_zones
         if telemetry.home is None or not telemetry.has_position:

@@ -16,7 +16,7 @@ from uav_task_alloc.mavlink.gcs.policy import Policy
 REST_SPEED = 1.0  # [m/s] below which a vehicle is at rest
 _REST_DISTANCE, _REST_TIME = 3.0, 6.0  # [m], [s]: at rest, for a hand-over
 _LIES_TIME = 2.0  # [s] at rest, of a killed one; a fall is faster than REST_SPEED at once
-_LOW_BATTERY = 0.2  # [0..1] below which a hand-over is refused
+LOW_BATTERY = 0.2  # [0..1] below which a hand-over is refused
 
 
 class HandOver:
@@ -58,8 +58,8 @@ class HandOver:
             return 'the mission on board is foreign'
         if authority.state is AuthorityState.SUSPENDED:
             return f'SUSPENDED: {authority.why}'
-        if telemetry.battery < _LOW_BATTERY:
-            return f'battery = {telemetry.battery:.0%}: expected at least {_LOW_BATTERY:.0%}'
+        if telemetry.battery < LOW_BATTERY:
+            return f'battery = {telemetry.battery:.0%}: expected at least {LOW_BATTERY:.0%}'
         if not telemetry.past_boot:
             return telemetry.starting
         if not (telemetry.airborne or telemetry.grounded):

@@ -21,6 +21,7 @@ from uav_task_alloc.mavlink.gcs.end_of_list import EndOfList
 from uav_task_alloc.mavlink.gcs.event_retry import EventRetry
 from uav_task_alloc.mavlink.gcs.flown_items import MAX_AGE
 from uav_task_alloc.mavlink.gcs.list_execution import ListExecution
+from uav_task_alloc.mavlink.gcs.low_battery_return import LowBatteryReturn
 from uav_task_alloc.mavlink.gcs.message_rates import MessageRates
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.mission_messages import MissionMessages
@@ -112,10 +113,14 @@ class MissionExecutor:
                           lambda: self.policy, lambda: self.holds.reason, self.fence.missing)
         transfers = MissionTransfers(self.sender, self.telemetry, self.onboard, self.authority,
                                      self._end_of_list)
+        self._low_battery = LowBatteryReturn(
+            self.sender, self.telemetry, self.watch, self.profile, self.holds, self.energy,
+            self._end_of_list, self.notes)
         return (
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
-            self.holds.hold, self._end_of_list.stop_return, transfers.upload, transfers.read,
-            self._has_list, transfers.resume, self._may_act, self._hold_first,
+            self._low_battery.turn_home, self.holds.hold, self._end_of_list.stop_return,
+            transfers.upload, transfers.read, self._has_list, transfers.resume, self._may_act,
+            self._hold_first,
             self._end_of_list.held_too_long, self._settled, self.holds.stay,
             self._end_of_list.empty, self._end_of_list.given_up, self.fence.clear_way,
             execution.update_mission, takeoff.take_off, execution.fly)
@@ -128,7 +133,7 @@ class MissionExecutor:
     @property
     def alarm(self) -> str:
         """Text on a condition that requires action by a human; '': none."""
-        return self._end_of_list.alarm
+        return self._end_of_list.alarm or self._low_battery.alarm
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:
         """Execute a new task list.

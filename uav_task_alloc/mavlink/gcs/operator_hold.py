@@ -75,6 +75,12 @@ class HoldRule:
         """Whether it holds as another node reports its UAV, too."""
         return SHARED_ID in self._requests
 
+    @property
+    def held_by_others(self) -> str:
+        """Who else holds a UAV whose id is shared, other than a zone ahead; '': nobody."""
+        others = sorted(self._requests.keys() - {SHARED_ID, _ZONE})
+        return f'it is held by {" and ".join(others)}' if others else ''
+
     def request(self, request: HoldRequest, now: float) -> None:
         """Take a request, which replaces that of the same source."""
         before = self._requests.get(request.source)
