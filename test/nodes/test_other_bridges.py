@@ -121,6 +121,66 @@ def test_while_its_id_is_shared_a_uav_holds_gets_no_lists_and_is_not_available(w
     whole.until(lambda: not session.executor.holds.for_shared_id)
 
 
+def test_a_list_that_came_while_its_id_was_shared_is_flown_only_where_it_is_sent_again(
+        whole, probe):
+    lists = probe.node.create_publisher(m.TaskList, 'uav_1/task_list', LATCHED)
+    gone = Probe('rosbag2_player')
+    of_recording = gone.node.create_publisher(m.TaskList, 'uav_1/task_list', LATCHED)
+    whole.send(HEARTBEAT)
+    whole.until(lambda: whole.node.lists.known)
+    session, = whole.node.ground_station.sessions.values()
+    taken = []
+    session.executor.assign = lambda tasks, now: taken.append(tasks.revision) or []
+    shared = ['another node']
+    whole.node.others.shared = lambda uav_id, now: shared[0]
+    lists.publish(m.TaskList(uav_id='uav_1', revision=5))
+    whole.until(lambda: 'uav_1' in whole.node.lists.pending)
+    of_recording.publish(m.TaskList(uav_id='uav_1', revision=900))
+    whole.until(lambda: whole.node.lists.pending['uav_1'].revision == 900)
+    whole.node.origins.conflict = lambda: 'another origin'  # as of a second fleet
+    gone.close()
+    whole.until(lambda: whole.node.count_publishers('uav_1/task_list') == 1)
+    shared[0] = ''
+    whole.until(lambda: 'uav_1' not in whole.node.lists.pending)
+    whole.node.origins.conflict = lambda: ''
+    whole.until(lambda: taken)
+    assert taken == [5]
+
+
+def test_a_recording_that_is_played_is_told_from_a_second_bridge(whole, probe):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    player, clock = Probe('rosbag2_player'), itertools.count(1)
+    played = player.node.create_publisher(m.UavState, 'uav_states', STATES)
+    other = probe.node.create_publisher(m.UavState, 'uav_states', STATES)
+    whole.send(HEARTBEAT)
+    whole.node.others.note_own(m.UavState(uav_id='uav_1'))
+
+    def reported(until):
+        def step():
+            msg = m.UavState(uav_id='uav_1')
+            msg.header.stamp.sec = next(clock)
+            played.publish(msg)
+            probe.executor.spin_once(timeout_sec=0.0)
+            return whole.node.others.warning(time.monotonic()) and until()
+        whole.until(step)
+
+    def warning():
+        return whole.node.others.warning(time.monotonic())
+
+    reported(lambda: 'another node reports' in warning())  # it may be the other one
+    probe.node.destroy_publisher(other)
+    reported(lambda: 'a recording that is played reports' in warning())
+    assert 'states are published by /mavlink_bridge and /rosbag2_player' in warning()
+    assert 'expected the end of `ros2 bag play`' in warning()
+    assert whole.node.grounded() == ('ids of its own: a recording that is played reports UAVs of '
+                                     'this bridge, too')
+    reported(lambda: whole.node.others.shared('uav_1', time.monotonic()))
+    assert whole.node.others.shared('uav_1', time.monotonic()).startswith(
+        'a recording that is played reports uav_1, too (states are published by /mavlink_bridge')
+    reported(lambda: (fact(health, 'uav_ids') or [0])[0] == ord(DiagnosticStatus.WARN))
+    player.close()
+
+
 def test_a_single_report_of_another_node_holds_no_uav(domain):
     one = Bridge('/four', 0)
     one.others.note_own(m.UavState(uav_id='uav_1'))

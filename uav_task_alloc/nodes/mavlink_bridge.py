@@ -236,12 +236,12 @@ class MavlinkBridge(Node):
 
     def assign_lists(self) -> None:
         """Fly the waiting lists, once all origins are known and agree, and ids are not shared."""
+        now = time.monotonic()
+        self.lists.keep_back(lambda uav_id: self.others.shared(uav_id, now))
         if (not self.lists.pending or self.exiting() or self.origins.conflict()
                 or not self.origins.settled()):
             return
-        now = time.monotonic()
-        for uav_id, tasks in self.lists.take(
-                lambda uav_id: self.others.shared(uav_id, now)).items():
+        for uav_id, tasks in self.lists.take().items():
             with self.lock:
                 out = self.ground_station.assign(uav_id, tasks, time.monotonic())
             self.connections.send(out)

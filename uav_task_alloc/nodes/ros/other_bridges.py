@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds other nodes that report the UAVs of a bridge, as the bridge of a second fleet."""
+"""Finds other nodes that report the UAVs of a bridge: that of a second fleet, or a recording."""
 from __future__ import annotations
 
 import math
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 
 from rclpy.node import Node
 from rclpy.subscription import Subscription
@@ -20,6 +20,8 @@ _SEARCH_PERIOD = 0.25  # [s]
 SETTLING_TIME = 8.0
 _RECENT = 5.0  # [s] since the last report of another node
 _SEVERAL = 3  # reports of a UAV by another node after which one in flight holds
+_PLAYER = 'rosbag2_player'  # the node of `ros2 bag play`
+_RECORDED = 'a recording that is played reports'
 _OWN_REPORTS = 500  # of the bridge, to tell them from others; its queue is shorter
 
 
@@ -27,7 +29,9 @@ class OtherBridges:
     """Finds whether another node reports UAVs of the bridge, too.
 
     It would fly another vehicle along the same lists: two fleets in one ROS system without
-    namespaces. States are subscribed to only while another node publishes some.
+    namespaces. A recording that is played has the same effect: the allocator believes its states,
+    and its lists are received, too. States are subscribed to only while another node publishes
+    some.
 
     Arguments of methods:
         now: steady time [s].
@@ -45,6 +49,7 @@ class OtherBridges:
         # how often in a row, and [s] steady time of the last, by UAV
         self._reported: dict[str, tuple[int, float]] = {}
         self._publishers: tuple[str, ...] = ()  # names of all nodes that publish states
+        self._recording = False  # all of them but the bridge play a recording
 
     def note_own(self, msg: m.UavState) -> None:
         """Remember a state of the bridge.
@@ -63,9 +68,11 @@ class OtherBridges:
         self._searched, node = now, self._node
         topic = node.resolve_topic_name(_TOPIC)
         others = node.count_publishers(topic) > 1
+        found = node.get_publishers_info_by_topic(topic) if others else []
         self._publishers = tuple(sorted(
-            f'{each.node_namespace.rstrip("/")}/{each.node_name}'
-            for each in node.get_publishers_info_by_topic(topic))) if others else ()
+            f'{each.node_namespace.rstrip("/")}/{each.node_name}' for each in found))
+        nodes = Counter(each.node_name for each in found) - Counter([node.get_name()])
+        self._recording = nodes.keys() == {_PLAYER}
         if others and self._subscription is None:
             self._subscription = node.create_subscription(
                 m.UavState, _TOPIC, self._on_state, STATES)
@@ -79,8 +86,10 @@ class OtherBridges:
 
     def grounded(self, now: float) -> str:
         """Return what a take-off waits for; '' where it waits for nothing."""
-        return ('ids of its own: another node reports UAVs of this bridge, too'
-                if self._shared(now) else '')
+        if not self._shared(now):
+            return ''
+        return (f'ids of its own: {_RECORDED} UAVs of this bridge, too' if self._recording else
+                'ids of its own: another node reports UAVs of this bridge, too')
 
     def shared(self, uav_id: str, now: float) -> str:
         """Return that another node reports a UAV, too, and which nodes; '' where none does.
@@ -93,11 +102,17 @@ class OtherBridges:
             count, at = self._reported.get(uav_id, (0, 0.0))
         if count < _SEVERAL or now - at > _RECENT:
             return ''
-        return f'another node reports {uav_id}, too{self._names()}'
+        source = _RECORDED if self._recording else 'another node reports'
+        return f'{source} {uav_id}, too{self._names()}'
 
     def warning(self, now: float) -> str:
         """Return which UAVs another node reports, too; '' where it reports none."""
         shared = self._shared(now)
+        if shared and self._recording:
+            return (f'{first_of(shared)}: {_RECORDED} UAVs of these ids, too{self._names()}, as '
+                    'if they were elsewhere, and perhaps lists for them; none takes off, and '
+                    'those in flight hold: expected the end of `ros2 bag play`, or a '
+                    'ROS_DOMAIN_ID of its own for it')
         return (f'{first_of(shared)}: another node reports UAVs of these ids, too{self._names()}, '
                 'so that two vehicles may fly one list; none takes off, and those in flight hold: '
                 'expected a namespace or ROS_DOMAIN_ID for each fleet, or another uav_id_pattern'

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.errors import InvalidValue
@@ -31,6 +32,8 @@ class TaskListInputs:
         self._convert, self._on_change = convert, on_change
         self.known: set[str] = set()  # UAVs
         self.pending: dict[str, TaskList] = {}
+        self._subscriptions: dict[str, Subscription[m.TaskList]] = {}
+        self._kept_back: set[str] = set()  # UAVs whose waiting list may be of another fleet
 
     def subscribe(self, uav_id: str) -> None:
         """Subscribe to the lists of a UAV, once; an id that is too long for a topic is logged.
@@ -42,15 +45,20 @@ class TaskListInputs:
             return
         self.known.add(uav_id)
         try:
-            topic = check_topic(self._node, TASK_LIST, uav_id)
+            check_topic(self._node, TASK_LIST, uav_id)
         except InvalidValue as error:
             self._log.write('error', f'it gets no task lists: {error}')
             return
+        self._listen(uav_id)
+
+    def _listen(self, uav_id: str) -> None:
+        """Subscribe to the lists of a UAV; the latest of each publisher follows."""
 
         def on_message(msg: m.TaskList) -> None:
             self.on_list(uav_id, msg)
 
-        self._node.create_subscription(m.TaskList, topic, on_message, LATCHED)
+        self._subscriptions[uav_id] = self._node.create_subscription(
+            m.TaskList, check_topic(self._node, TASK_LIST, uav_id), on_message, LATCHED)
 
     def on_list(self, uav_id: str, msg: m.TaskList) -> None:
         """Take the newest list of a UAV; an invalid one is logged and changes nothing."""
@@ -60,16 +68,25 @@ class TaskListInputs:
             self._log.write('warning', f'{uav_id}/task_list: {error}: ignored')
         self._on_change()
 
-    def take(self, waits: Callable[[str], object] = lambda uav_id: False) -> dict[str, TaskList]:
-        """Return the waiting lists by UAV, and forget them.
+    def keep_back(self, shared: Callable[[str], object]) -> None:
+        """Let lists of UAVs that another node reports, too, wait; drop them once it does not.
+
+        They may be of another fleet, or of a recording that was played: who still publishes a
+        list sends it again.
 
         Args:
-            waits: whether the list of a UAV goes on waiting.
-
-        Returns:
-            Those that do not.
+            shared: whether another node reports a UAV, too.
         """
-        taken = {uav_id: each for uav_id, each in self.pending.items() if not waits(uav_id)}
-        self.pending = {uav_id: each for uav_id, each in self.pending.items()
-                        if uav_id not in taken}
+        waiting = {uav_id for uav_id in self.pending if shared(uav_id)}
+        for uav_id in self._kept_back - waiting:
+            del self.pending[uav_id]
+            self._node.destroy_subscription(self._subscriptions[uav_id])
+            self._listen(uav_id)
+        self._kept_back = waiting
+
+    def take(self) -> dict[str, TaskList]:
+        """Return the waiting lists by UAV that are not kept back, and forget them."""
+        taken = {uav_id: each for uav_id, each in self.pending.items()
+                 if uav_id not in self._kept_back}
+        self.pending = {uav_id: self.pending[uav_id] for uav_id in self._kept_back}
         return taken
