@@ -6,6 +6,7 @@ import pytest
 from authority_bench import flying_with_pilot
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 from test_operator_hold import is_held
 
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
@@ -84,6 +85,27 @@ def test_in_the_air_a_list_waits_at_the_start_until_others_would_be_found(kind):
     assert executor.sender.waits_for == 'the search for other bridges'
     executor.policy = bench.policy
     assert bench.run(lambda: sorted(bench.completed()) == ['A', 'B'])
+
+
+@BOTH
+def test_in_the_air_a_list_that_is_on_board_is_verified_at_once_after_a_restart(kind):
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: bench.state().list_revision == 1, 20.0)
+    bench.start()
+    bench.discover()
+    bench.executor().policy = dataclasses.replace(bench.policy, settling='the search')
+    bench.assign(task_list('ABC'))
+    sent = len(bench.line.sent('COMMAND_LONG')), len(bench.line.sent('MISSION_SET_CURRENT'))
+    counts = len(bench.line.sent('MISSION_COUNT'))
+    assert bench.run(lambda: bench.state().list_revision == 1, 7.0)
+    assert bench.onboard().verified()
+    bench.run(lambda: bench.state().mode is not UavMode.ON_MISSION, 5.0)
+    assert len(bench.line.sent('MISSION_COUNT')) == counts
+    assert len(bench.line.sent('MISSION_SET_CURRENT')) == sent[1]
+    assert not [m for m in bench.line.sent('COMMAND_LONG')[sent[0]:]
+                if m.command == d.MAV_CMD_DO_SET_MODE]
+    bench.executor().policy = bench.policy
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
 
 
 def test_on_the_ground_a_list_is_transferred_at_the_start():

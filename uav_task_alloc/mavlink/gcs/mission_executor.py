@@ -38,6 +38,7 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.telemetry_messages import HEALTH_REPORTS
 from uav_task_alloc.mavlink.gcs.vehicle_energy import VehicleEnergy
 from uav_task_alloc.mavlink.gcs.vehicle_fence import FenceMemory, VehicleFence
+from uav_task_alloc.mavlink.mission.diff import DiffKind
 from uav_task_alloc.mavlink.mission.first_leg import LegStart
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.peer import Peer
@@ -337,6 +338,13 @@ class MissionExecutor:
         return [] if self.sender.backing_off(now) else self.sender.set_mode(ModeFunction.HOLD, now)
 
     def _settled(self, now: float) -> NextMessages:
-        """In the air, fly no list before another node that reports its UAV would be found."""
-        settling = self.policy.settling
-        return self.sender.wait_for(settling) if settling and self.telemetry.airborne else None
+        """In the air, fly no list before another node that reports its UAV would be found.
+
+        A list that is on board, as after a restart of the bridge, is verified: nothing is sent.
+        """
+        settling, onboard = self.policy.settling, self.onboard
+        if not settling or not self.telemetry.airborne:
+            return None
+        if onboard.remaining().stops and (diff := onboard.diff()).kind is DiffKind.KEEP:
+            onboard.adopt(diff, now)
+        return self.sender.wait_for(settling)
