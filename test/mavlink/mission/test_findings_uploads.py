@@ -16,9 +16,7 @@ from test_findings_evidence import Flight
 
 from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE, ModeFunction
 from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
-from uav_task_alloc.mavlink.mission.download import Download
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList, mission_items
-from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.mission.reports_during_upload import ReportsDuringUpload
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.model import Task
@@ -336,14 +334,6 @@ def test_a_reboot_at_the_place_of_the_current_item_completes_it(x, shown, comple
     assert list(flight.table.completed) == completed
 
 
-def test_a_request_is_repeated_after_twice_the_time_of_an_answer():
-    download = Download(Peer(1, 1, *OURS), 0.0)
-    download.receive(d.MAVLink_mission_count_message(*OURS, 2), 0.2)
-    assert download.step(0.5) == []
-    assert [m.seq for m in download.step(0.61)] == [0]
-    assert [m.seq for m in download.step(1.02)] == [0]
-
-
 @PX4
 def test_a_task_about_to_be_reached_is_flown_before_a_list_that_begins_elsewhere(kind):
     bench = flying(kind, 'ABC')
@@ -362,18 +352,6 @@ def test_a_task_that_is_served_is_not_left_for_a_list_that_begins_elsewhere(kind
     bench.assign(task_list('CBA', 2, service=4.0))
     flown_once_each(bench, 'ABC')
     assert places(bench) == ['A', 'C', 'B']
-
-
-def test_a_readback_that_the_vehicle_has_ended_begins_again_at_once():
-    download = Download(Peer(1, 1, *OURS), 0.0)
-    ended = d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR)
-    assert download.receive(ended, 0.1) == []  # of an earlier transfer: the list is on its way
-    again = []
-    for n in range(20):
-        download.receive(d.MAVLink_mission_count_message(*OURS, 3), 0.2 + n)
-        again += download.receive(ended, 0.5 + n)
-    assert {m.get_type() for m in again} == {'MISSION_REQUEST_LIST'}
-    assert 1 < len(again) < 20
 
 
 @PX4

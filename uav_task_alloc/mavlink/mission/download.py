@@ -14,7 +14,9 @@ _PERIOD = 1.0  # [s] until a request is repeated, at most
 _LEAST_PERIOD = 0.4  # [s] the same, at least
 _RELIST_AFTER = 4.0  # [s] without an answer for one item: PX4 may have ended the transfer
 _MAX_RELISTS = 3  # MISSION_REQUEST_LIST sent again after that
-_MAX_ABORTS = 5  # MISSION_REQUEST_LIST sent again after the vehicle has ended the transfer
+# MISSION_REQUEST_LIST sent again after the vehicle has ended the transfer, as PX4 does at a
+# request that a link has delayed by two items: long missions take many tries then
+_MAX_ABORTS = 12
 _PATIENCE = 12.0  # [s] for one answer; ArduPilot denies a list for 8 s after a broken upload
 
 
