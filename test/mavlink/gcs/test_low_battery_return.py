@@ -53,6 +53,18 @@ def test_it_returns_on_a_low_battery_and_lands(kind):
 
 
 @BOTH
+def test_a_refused_return_is_tried_again_and_logged_once(kind):
+    bench = held_for_shared_id(kind)
+    bench.line.tampers.append(lambda direction, m, now: [] if direction == 'up' and (
+        m.get_type() == 'COMMAND_LONG' and now < end) else None)
+    end = bench.now + 60.0
+    set_battery(bench, 0.195)
+    assert run_shared(bench, 120.0, lambda: returns(bench))
+    assert bench.now > end
+    assert len([note for note in bench.notes if note.startswith('returns on a low')]) == 1
+
+
+@BOTH
 def test_it_lands_where_its_id_is_its_own_again_on_the_way_home(kind):
     bench = held_for_shared_id(kind)
     set_battery(bench, 0.15)

@@ -24,6 +24,7 @@ _REACHED_HEIGHT = 0.9  # fraction of the commanded height
 _RETRY, _RETRIES = 10.0, 5  # [s] after a failure that may be temporary
 _SLOW_RETRY = 60.0  # [s] after more failures, without limit
 _SET_ATTEMPTS = 5  # to set an item as current that only the ACK can show to be set
+_LANDED_STATE = 3.0  # [s] after HOLD in which a landed state comes, sent once a second, also late
 _REFUSAL_DELAY = 5.0  # [s] of arming attempts before a refusal is logged: the reason may follow
 
 _Completion = Callable[[float], None]
@@ -47,6 +48,8 @@ class CommandSender:
         self.must_start = False  # airborne and held by the bridge: set mission mode
         self.armed_here = False  # armed by the bridge, on the ground: take-off or disarm is next
         self.climbing = False  # by a take-off of the bridge
+        # mission mode was commanded since it was armed, as it looked airborne: a PX4 takes off
+        self.started_mission = False
         self.mission_refused = ''  # why the last attempt to set mission mode was refused
         self.arming_refusal = ''  # the vehicle's text on why it does not arm
         # by seq on the wire, until when [s] the commands to set it as the current item were sent
@@ -222,6 +225,7 @@ class CommandSender:
                 self.must_start = False
 
         self.commanded = mode
+        self.started_mission = self.started_mission or mode is ModeFunction.MISSION
         return self.start(Command(_mode_name(mode), self._profile.mode_command(
             self._peer, mode), lambda: (
                 telemetry.mode is mode and not telemetry.arms_into_mission)), now, done)
@@ -293,6 +297,7 @@ class CommandSender:
         ground = telemetry.altitude - (
             0.0 if math.isnan(telemetry.height) else telemetry.height)
         takeoff = self._profile.takeoff_command(self._peer, height, ground)
+        self.started_mission = False
         # ArduPilot refuses one that it has executed: its ACK may be lost
         return self.start(Command('take off', takeoff, lambda: self.left_ground,
                                   retry_refused=True,
@@ -300,14 +305,27 @@ class CommandSender:
                           now, self.took_off)
 
     def disarm(self, now: float) -> list[Message]:
-        """Disarm on the ground, after arming by the bridge, when there is nothing to fly."""
+        """Disarm on the ground, after arming by the bridge, when there is nothing to fly.
+
+        Where its mission may just have taken it off it holds first, until its landed state is
+        known; nothing is disarmed in the air.
+        """
+        telemetry = self._telemetry
+        if self.started_mission and ModeFunction.HOLD in self._profile.set_mode:
+            if self.backing_off(now):
+                return []
+            if telemetry.mode is not ModeFunction.HOLD:
+                return self.set_mode(ModeFunction.HOLD, now)
+            if now - telemetry.mode_at < _LANDED_STATE:
+                return self.wait_for('its landed state')
         self.armed_here = False
         disarm = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
-        return self.start(Command('disarm', disarm, lambda: not self._telemetry.armed), now,
-                       lambda t: None)
+        return self.start(Command('disarm', disarm, lambda: not telemetry.armed,
+                                  wanted=lambda: not telemetry.airborne), now, lambda t: None)
 
     def _armed(self, now: float) -> None:
         self._telemetry.armed = self.armed_here = True
+        self.started_mission = False
 
     def took_off(self, now: float) -> None:
         """Wait for the height of the take-off: the vehicle executes it.

@@ -35,7 +35,7 @@ class LowBatteryReturn:
         self._profile, self._holds, self._energy = profile, holds, energy
         self._end_of_list, self._notes = end_of_list, notes
         self._reported = False  # a battery that is not empty; else 0 is unknown
-        self._low = self._turned = False  # in this flight, while it held
+        self._low = self._turned = self._noted = False  # in this flight, while it held
         self.alarm = ''  # why it stays on a low battery; '': it does not
 
     def turn_home(self, now: float) -> NextMessages:
@@ -50,7 +50,7 @@ class LowBatteryReturn:
         telemetry, alarm_before, self.alarm = self._telemetry, self.alarm, ''
         self._reported = self._reported or telemetry.battery > 0.0
         if not telemetry.airborne or not self._watch.authority.held or self._sender.climbing:
-            self._low = self._turned = False
+            self._low = self._turned = self._noted = False
             return None
         returns = telemetry.mode is ModeFunction.RETURN
         if self._turned and returns:
@@ -72,9 +72,11 @@ class LowBatteryReturn:
         if self._sender.backing_off(now):
             return []
         self._turned = True
-        self._notes.append(OperatorNote(
-            'error', f'returns on a low battery ({self._charge}), as it gets no list: '
-            f'{self._holds.reason}'))
+        if not self._noted:
+            self._noted = True
+            self._notes.append(OperatorNote(
+                'error', f'returns on a low battery ({self._charge}), as it gets no list: '
+                f'{self._holds.reason}'))
         return self._sender.set_mode(ModeFunction.RETURN, now)
 
     @property

@@ -46,7 +46,10 @@ class Takeoff:
         if self._sender.climbs_by_mission:
             self._sender.armed_here = False
         if self._sender.armed_here and self._sender.left_ground and self._authority.held:
-            self._sender.took_off(now)  # neither an ACK nor telemetry showed it in time
+            if self._sender.started_mission:
+                self._sender.armed_here = False  # a hold has ended the climb by its mission
+            else:
+                self._sender.took_off(now)  # neither an ACK nor telemetry showed it in time
         if not self._sender.armed_here or self._telemetry.airborne or not self._authority.held:
             return None
         return self.take_off(now) if self._wants_to_fly() else self._sender.disarm(now)
@@ -68,7 +71,11 @@ class Takeoff:
                 return sender.wait_for(departure)
             if zone := self._zone_over_start():
                 return sender.wait(zone)
-        return sender.take_off(policy.cruise_altitude, self._wants_to_fly, now)
+        climbed, out = sender.climbing, sender.take_off(
+            policy.cruise_altitude, self._wants_to_fly, now)
+        if climbed and out is None and self._held_by():
+            return []  # the hold, which has waited for the end of the climb, comes first
+        return out
 
     def _wants_to_fly(self) -> bool:
         stays = (self._held_by() or self._policy().grounded or self._fence_missing()
