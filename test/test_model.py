@@ -2,7 +2,9 @@
 """Values of the model are checked; errors name place, value and expectation."""
 import math
 from dataclasses import replace
+from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from uav_task_alloc.actions import ACTIONS, Action
@@ -116,6 +118,24 @@ SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]
     (lambda: ThreatZone.cylinder('z1', (0, 0), 10.0, 'a', 'b'),
      "zone z1: z_min, z_max = ('a', 'b'): expected z_min < z_max"),
     (lambda: Task('t1', (0, 0, 0), path=5), 'task t1: path = 5: expected points [m]'),
+    (lambda: Task('t1', (0, 0, 0), value=10**5000),
+     'task t1: value = a value of type int: expected a number in (0, inf]'),
+    (lambda: Task('t1', (0, 0, 0), value=np.ones((2, 1))),
+     'task t1: value = array([[1.],        [1.]]): expected a number in (0, inf]'),
+    (lambda: Task('t1', (0, 10**400, 0)),
+     f'task t1: position = (0, {10**195}... (409 characters): expected three coordinates [m]'),
+    (lambda: Uav('u1', (0, 0, 0), endurance=None),
+     'uav u1: endurance = None: expected a number in [0, inf]'),
+    (lambda: Uav('u1', (0, 0, 0), available_from=None),
+     'uav u1: available_from = None: expected a number in [0, 4e+09]'),
+    (lambda: ThreatZone.cylinder('z1', (0, 0), 10.0, 10**400),
+     f'zone z1: z_min, z_max = ({10**198}... (408 characters): expected z_min < z_max'),
+    (lambda: ThreatZone.cylinder('z1', (0, 0), 10.0, True, 9.0),
+     'zone z1: z_min, z_max = (True, 9.0): expected z_min < z_max'),
+    (lambda: ThreatZone.polygon('z1', 'abc'),
+     "zone z1: vertices = ('a',): expected points (x, y) [m]"),
+    (lambda: ThreatZone.polygon('z1', [(0,), (1,), (2,)]),
+     'zone z1: vertices = (0,): expected points (x, y) [m]'),
 ])
 def test_a_bad_value_is_refused_with_place_and_expectation(make, text):
     with pytest.raises(InvalidValue) as refused:
@@ -151,6 +171,18 @@ def test_numbers_become_floats_and_sets_are_frozen():
     assert task.allowed_uavs == frozenset({'u1'})
     assert hash(task) == hash(Task('t1', (1.0, 2.0, 3.0), required_capabilities={'camera'},
                                    allowed_uavs=['u1']))
+    zone = ThreatZone.cylinder('z1', (0, 0), 10, Fraction(1, 2), np.float32(9.0))
+    assert [type(z) for z in (zone.z_min, zone.z_max)] == [float, float]
+
+
+def test_names_may_come_from_an_iterator():
+    task = Task('t1', (1, 2, 3), required_capabilities=(name for name in ('camera', 'gripper')),
+                allowed_uavs=map(str, ['u1']))
+    assert task.required_capabilities == {'camera', 'gripper'}
+    assert task.allowed_uavs == {'u1'}
+    assert Uav('u1', (0, 0, 0), capabilities=iter(['camera'])).capabilities == {'camera'}
+    with pytest.raises(InvalidValue, match='required_capabilities'):
+        Task('t1', (1, 2, 3), required_capabilities=(name for name in ('camera', 5)))
 
 
 def test_a_plan_gives_the_route_of_a_uav():

@@ -32,7 +32,7 @@ def check_point(place: str, value: Iterable[float]) -> tuple[float, float, float
     """
     try:
         x, y, z = (float(v) for v in value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidValue(place, value, 'three coordinates [m]') from None
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
         raise InvalidValue(place, (x, y, z), 'three finite coordinates [m]')
@@ -61,7 +61,10 @@ def check_number(place: str, value: float, low: float, high: float = math.inf,
     if isinstance(value, bool) or (not isinstance(value, (int, float)) and not hasattr(
             value, '__float__')):
         raise InvalidValue(place, value, _number_in(low, high, open_low))
-    number = float(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):  # of an array, or of a very long integer
+        raise InvalidValue(place, value, _number_in(low, high, open_low)) from None
     if not low <= number <= high or (open_low and number == low):
         raise InvalidValue(place, number, _number_in(low, high, open_low))
     return number
@@ -196,10 +199,13 @@ def check_names(place: str, value: Iterable[str]) -> frozenset[str]:
     Raises:
         InvalidValue: it is a bare string, or holds anything but non-empty strings.
     """
-    if isinstance(value, str) or not isinstance(value, Iterable) or not all(
-            isinstance(v, str) and v.strip() for v in value):
-        raise InvalidValue(place, value, 'a set of non-empty strings')
-    return frozenset(value)
+    expected = 'a set of non-empty strings'
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise InvalidValue(place, value, expected)
+    names = tuple(value)  # an iterator gives them once
+    if not all(isinstance(name, str) and name.strip() for name in names):
+        raise InvalidValue(place, value, expected)
+    return frozenset(names)
 
 
 def check_polygon(place: str, vertices: Iterable[Iterable[float]]) -> tuple[
@@ -219,7 +225,10 @@ def check_polygon(place: str, vertices: Iterable[Iterable[float]]) -> tuple[
     """
     corners = []
     for corner in vertices:
-        x, y = (float(v) for v in tuple(corner)[:2])
+        try:
+            x, y = (float(v) for v in tuple(corner)[:2])
+        except (TypeError, ValueError, OverflowError):
+            raise InvalidValue(place, corner, 'points (x, y) [m]') from None
         if not (math.isfinite(x) and math.isfinite(y)):
             raise InvalidValue(place, (x, y), 'finite coordinates [m]')
         if max(abs(x), abs(y)) > FAR:

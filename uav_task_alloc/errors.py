@@ -33,7 +33,10 @@ def shown(value: object) -> str:
     Returns:
         Its repr, at most some 230 characters.
     """
-    text = repr(value)
+    try:
+        text = repr(value).replace('\n', ' ')  # of an array it has several lines
+    except Exception:  # of an integer of thousands of digits, for one
+        text = f'a value of type {type(value).__name__}'
     return text if len(text) <= _MAX_SHOWN else f'{text[:_MAX_SHOWN]}... ({len(text)} characters)'
 
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`plan`: routes, reasons, options, errors."""
 import math
+from decimal import Decimal
+from fractions import Fraction
 
+import numpy as np
 import pytest
 from plan_checks import check, make
 
@@ -190,10 +193,23 @@ def test_stop_ends_the_search_with_the_best_plan_so_far():
     ({'zones': None}, 'zones = None: expected an iterable of ThreatZone'),
     ({'max_iterations': -1}, 'max_iterations = -1: expected an integer'),
     ({'locked': {'u1': 't'}}, r"locked\[u1\] = 't': expected a sequence of task ids"),
+    ({'budget': np.ones(2)}, r'budget = array\(\[1., 1.\]\): expected a number in'),
+    ({'route_end': np.ones(2)}, r'route_end = array\(\[1., 1.\]\): expected one of hold, home'),
+    ({'threads': True}, r'threads = True: expected an integer in \[1, 64\]'),
+    ({'max_iterations': True}, 'max_iterations = True: expected an integer'),
 ])
 def test_a_wrong_option_is_refused(options, text):
     with pytest.raises(InvalidValue, match=text):
         plan([ONE], [Task('t', (0.0, 0.0, 0.0))], **options)
+
+
+def test_numbers_of_other_types_count_as_what_they_are():
+    zone = ThreatZone.cylinder('z', (150.0, 20.0), 30.0)
+    options = {'threads': np.int64(1), 'trips': np.int32(2), 'max_iterations': np.int64(5),
+               'budget': Decimal('0.5'), 'altitude_min': Fraction(1, 2),
+               'altitude_max': Decimal(90), 'clearance': np.float32(2.0)}
+    assert plan([ONE], [Task('t', (300.0, 40.0, 9.0))], [zone], **options).routes == {
+        ONE.id: ('t',)}
 
 
 def test_ids_are_used_once():

@@ -114,12 +114,11 @@ def check_limits(altitude_min: float, altitude_max: float) -> Floats:
     Raises:
         InvalidValue: they are reversed, or not numbers.
     """
-    check_number('altitude_min', altitude_min, -math.inf)
-    check_number('altitude_max', altitude_max, -math.inf)
-    if not altitude_min <= altitude_max:
-        raise InvalidValue('altitude_min, altitude_max', (altitude_min, altitude_max),
-                           'altitude_min <= altitude_max')
-    return np.array([altitude_min, altitude_max], dtype=np.float64)
+    limits = (check_number('altitude_min', altitude_min, -math.inf),
+              check_number('altitude_max', altitude_max, -math.inf))
+    if limits[0] > limits[1]:
+        raise InvalidValue('altitude_min, altitude_max', limits, 'altitude_min <= altitude_max')
+    return np.array(limits, dtype=np.float64)
 
 
 def path_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,

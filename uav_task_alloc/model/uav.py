@@ -15,6 +15,7 @@ _UAV_LIMITS = (
     ('descent_speed', 0.0, math.inf), ('available_from', 0.0, LONG),
     ('available_until', 0.0, math.inf), ('full_range', 0.0, math.inf),
     ('turnaround', 0.0, math.inf), ('full_endurance', 0.0, math.inf))
+_AS_NOW = ('full_range', 'full_endurance')  # None: `range`, `endurance`
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ class Uav:
         if self.home is not None:
             put(self, 'home', check_point(place + 'home', self.home))
         for name, low, high in _UAV_LIMITS:
-            if getattr(self, name) is not None:
+            if getattr(self, name) is not None or name not in _AS_NOW:
                 put(self, name, check_number(place + name, getattr(self, name), low, high,
                                              open_low=name.endswith('_speed')))
         if self.available_until < self.available_from:

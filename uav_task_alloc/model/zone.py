@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from numbers import Real
 
 from uav_task_alloc.checks import check_id, check_number, check_point, check_polygon
 from uav_task_alloc.errors import InvalidValue
@@ -62,13 +61,23 @@ class ThreatZone:
         if self.shape is not Shape.POLYGON:
             put(self, 'radius', check_number(place + 'radius', self.radius, 0.0, 1e7,
                                              open_low=True))
-        ends = self.z_min, self.z_max
-        if self.shape is not Shape.HEMISPHERE and not (
-                all(isinstance(z, Real) for z in ends) and ends[0] < ends[1]):
-            raise InvalidValue(place + 'z_min, z_max', ends, 'z_min < z_max')
+        if self.shape is not Shape.HEMISPHERE:
+            self._check_ends(place)
         # of other shapes they are not checked: messages may carry anything there
         put(self, 'vertices', check_polygon(place + 'vertices', self.vertices)
             if self.shape is Shape.POLYGON else ())
+
+    def _check_ends(self, place: str) -> None:
+        """Check the lower and the upper end."""
+        refused = InvalidValue(place + 'z_min, z_max', (self.z_min, self.z_max), 'z_min < z_max')
+        for name in ('z_min', 'z_max'):
+            try:
+                number = check_number(place + name, getattr(self, name), -math.inf)
+            except InvalidValue:
+                raise refused from None
+            object.__setattr__(self, name, number)
+        if self.z_min >= self.z_max:
+            raise refused
 
     @classmethod
     def hemisphere(cls, id: str, center: Point, radius: float,

@@ -15,6 +15,7 @@ from uav_task_alloc.separation.rule import Separation
 _Named = TypeVar('_Named', Task, Uav, ThreatZone)
 ROUTE_ENDS = ('hold', 'home')
 MAX_BUDGET = 86_400.0  # [s]
+MAX_THREADS = 64
 
 
 def check_unique(kind: str, values: Iterable[_Named],
@@ -30,20 +31,25 @@ def check_unique(kind: str, values: Iterable[_Named],
 
 
 def check_options(budget: float, seed: int, route_end: str, threads: int,
-                  max_iterations: int | None, trips: int = 1) -> None:
-    """Check the scalar options of `plan`; raises InvalidValue."""
-    check_number('budget', budget, 0.0, MAX_BUDGET)
+                  max_iterations: int | None, trips: int = 1) -> float:
+    """Check the scalar options of `plan`; raises InvalidValue. Returns the budget [s]."""
+    seconds = check_number('budget', budget, 0.0, MAX_BUDGET)
     if not isinstance(seed, Integral):
         raise InvalidValue('seed', seed, 'an integer')
-    if route_end not in ROUTE_ENDS:
+    if not isinstance(route_end, str) or route_end not in ROUTE_ENDS:
         raise InvalidValue('route_end', route_end, f'one of {", ".join(ROUTE_ENDS)}')
-    if not isinstance(threads, int) or not 1 <= threads <= 64:
-        raise InvalidValue('threads', threads, 'an integer in [1, 64]')
-    if not isinstance(trips, int) or isinstance(trips, bool) or not 1 <= trips <= MAX_TRIPS:
+    if not _is_integer(threads) or not 1 <= threads <= MAX_THREADS:
+        raise InvalidValue('threads', threads, f'an integer in [1, {MAX_THREADS}]')
+    if not _is_integer(trips) or not 1 <= trips <= MAX_TRIPS:
         raise InvalidValue('trips', trips, f'an integer in [1, {MAX_TRIPS}]')
-    if max_iterations is not None and (not isinstance(max_iterations, int)
-                                       or max_iterations < 0):
+    if max_iterations is not None and (not _is_integer(max_iterations) or max_iterations < 0):
         raise InvalidValue('max_iterations', max_iterations, 'an integer in [0, inf) or None')
+    return seconds
+
+
+def _is_integer(value: object) -> bool:
+    """Whether a value is an integer, also one of numpy; True and False are none."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def check_types(hard_range: bool, weights: Weights | None, **functions: object) -> None:

@@ -92,7 +92,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
         UnknownName: there is no such solver.
     """
     _check_solver(solver)
-    check_options(budget, seed, route_end, threads, max_iterations, trips)
+    budget = check_options(budget, seed, route_end, threads, max_iterations, trips)
     check_types(hard_range, weights, stop=stop, on_iteration=on_iteration, clock=clock)
     if not isinstance(warm, (Plan, WarmState, type(None))):
         raise InvalidValue('warm', type(warm).__name__, 'a Plan, its state or None')
