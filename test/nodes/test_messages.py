@@ -7,8 +7,8 @@ import pytest
 from builtin_interfaces.msg import Time
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.list_records import ListStop
-from uav_task_alloc.allocator.records import TaskState
+from uav_task_alloc.allocator.list_records import ListStop, UavList
+from uav_task_alloc.allocator.records import Proposal, TaskState
 from uav_task_alloc.allocator.status import TaskStatus
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
@@ -222,6 +222,16 @@ def test_an_alert_and_a_hold_of_the_monitor_become_messages():
     hold = orders.from_separation_hold(SeparationHold('u1', True, 100.5, 160.5, 'why'))
     assert (hold.source, orders.hold_expiry(hold, 101.0)) == (m.UavHold.SEPARATION, 160.5)
     assert orders.to_hold_request(hold, 'u1').source == 'separation'
+
+
+def test_the_lists_of_a_proposal_count_from_its_stamp():
+    task = Task('t1', (10.0, 0.0, 50.0), value=2.0)
+    # a list that was never published has no stamp, a changed one that of the list in force
+    new = UavList('u1', 0, (ListStop(task, Leg((), 10.0), 3.0),), distance=10.0)
+    message = orders.from_proposal(Proposal(4, 3, (new,), 'ADD t1', 90.0, 120.0, False, ()))
+    assert message.plan.header.stamp == Time(sec=90)
+    assert [each.header.stamp for each in message.plan.lists] == [Time(sec=90)]
+    assert (message.plan.revision, message.plan.value, message.plan.distance) == (4, 2.0, 10.0)
 
 
 def test_modes_and_authority_are_known_by_their_names():

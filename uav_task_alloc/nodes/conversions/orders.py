@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from uav_task_alloc_msgs import msg as m
@@ -132,9 +133,10 @@ def from_proposal(proposal: Proposal) -> m.PlanProposal:
         proposal: without lists where it is closed.
 
     Returns:
-        For the topic `plan_proposal`.
+        For the topic `plan_proposal`; its lists have no revision yet, and the stamp of the
+        proposal, from which their times count.
     """
-    lists = proposal.lists
+    lists = tuple(replace(each, stamp=proposal.stamp) for each in proposal.lists)
     plan = Plan({each.uav: each.task_ids for each in lists},
                 distance=math.fsum(each.distance for each in lists),
                 value=math.fsum(stop.task.value for each in lists for stop in each.stops))
