@@ -366,3 +366,21 @@ def test_a_task_that_is_served_is_locked_with_locked_tasks_0_too():
     assert driver.world.locked_tasks() == {}
     driver.uav('a', 100.0, 0.0, 50.0, active_task='t1')
     assert driver.world.locked_tasks() == {'a': ('t1',)}
+
+
+def test_a_task_names_the_uavs_that_may_fly_it_and_cannot_now(driver):
+    driver.uav('c', 500.0, 0.0, 50.0, capabilities=frozenset({'camera'}))
+    driver.uav('d', 600.0, 0.0, 50.0, available=False)
+    driver.add(Task('photo', (50.0, 0.0, 50.0), required_capabilities={'camera'}),
+               Task('only_d', (60.0, 0.0, 50.0), allowed_uavs={'d'}))
+    driver.settle()
+    assert driver.state('photo') == 'ASSIGNED'
+    assert driver.reason('only_d') == 'no UAV can; those that may fly it cannot now: ' \
+                                      'd is not available'
+    driver.uav('c', 500.0, 0.0, 50.0, capabilities=frozenset({'camera'}), available=False)
+    driver.settle()
+    assert driver.reason('photo') == 'no UAV can; those that may fly it cannot now: ' \
+                                     'c is not available'
+    driver.add(Task('lidar', (50.0, 0.0, 50.0), required_capabilities={'lidar'}))
+    driver.settle()
+    assert driver.reason('lidar') == 'no UAV can'

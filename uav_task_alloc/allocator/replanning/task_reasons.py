@@ -10,6 +10,7 @@ from uav_task_alloc.allocator.state.task_state_machine import TaskStep, TaskTran
 from uav_task_alloc.allocator.state.tasks import without_failed
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
+from uav_task_alloc.errors import first_of
 
 
 def task_steps(world: World, left_out: Mapping[str, str]) -> list[TaskStep]:
@@ -27,7 +28,7 @@ def task_steps(world: World, left_out: Mapping[str, str]) -> list[TaskStep]:
     owners, late = world.lists.owners(), world.deadlines.texts
     trips = {task_id: (uav_id, number) for uav_id, rows in world.later.items()
              for number, row in enumerate(rows, 1) for task_id in row}
-    steps, left_out = [], {**left_out, **world.obstructed}
+    steps, left_out, absent = [], {**left_out, **world.obstructed}, _AbsentUavs(fleet, usable)
     for record in world.tasks.open():
         task_id = record.task.id
         uav_id, why = owners.get(task_id, ''), late.get(task_id, '')
@@ -40,13 +41,34 @@ def task_steps(world: World, left_out: Mapping[str, str]) -> list[TaskStep]:
             steps.append(TaskStep(task_id, TaskTransition.LIST, uav_id,
                                   f'after battery change {number} of {uav_id}'))
         else:
-            steps.append(_unlisted(record, fleet, usable, left_out))
+            steps.append(_unlisted(record, fleet, absent, left_out))
     return steps
 
 
-def _unlisted(record: TaskRecord, fleet: Fleet, usable: frozenset[str],
+class _AbsentUavs:
+    """Which tasks only UAVs may fly that may not be given tasks now, and why they may not."""
+
+    def __init__(self, fleet: Fleet, usable: frozenset[str]) -> None:
+        self._fleet, self.usable = fleet, usable
+        self._texts = dict[object, str]()  # by what decides who may fly a task
+
+    def text(self, record: TaskRecord) -> str:
+        """Return why those UAVs may not be given it; '' where it may be given to one, or none."""
+        task = record.task
+        key = task.required_capabilities, task.allowed_uavs, record.failed_on
+        if key not in self._texts:
+            known = self._fleet.records
+            able = [uav_id for uav_id in sorted(known)
+                    if may_fly(task, record.failed_on, known[uav_id].report)]
+            self._texts[key] = '' if not able or not self.usable.isdisjoint(able) else (
+                'those that may fly it cannot now: '
+                + first_of(map(self._fleet.why_unusable, able)))
+        return self._texts[key]
+
+
+def _unlisted(record: TaskRecord, fleet: Fleet, absent: _AbsentUavs,
               left_out: Mapping[str, str]) -> TaskStep:
-    task, known = record.task, fleet.records
+    task, known, usable = record.task, fleet.records, absent.usable
     if not known:
         return TaskStep(task.id, TaskTransition.WAIT, why='no UAV known yet')
     ordered = fleet.orders.reason(task.id)
@@ -64,7 +86,7 @@ def _unlisted(record: TaskRecord, fleet: Fleet, usable: frozenset[str],
     elif ordered and (state := owner_state(task.id, record, fleet)):
         why = state
     elif task.id in left_out:
-        why = left_out[task.id]
+        why = _joined(left_out[task.id], '' if blocked else absent.text(record))
     else:
         waits = _joined(ordered, 'waits for the next plan')
         return TaskStep(task.id, TaskTransition.WAIT, why=waits)
