@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`plan`: routes, reasons, options, errors."""
 import math
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 
@@ -210,6 +211,15 @@ def test_numbers_of_other_types_count_as_what_they_are():
                'altitude_max': Decimal(90), 'clearance': np.float32(2.0)}
     assert plan([ONE], [Task('t', (300.0, 40.0, 9.0))], [zone], **options).routes == {
         ONE.id: ('t',)}
+
+
+@pytest.mark.parametrize('objective', ['distance', 'balanced'])
+def test_sums_of_the_largest_values_are_finite(objective):
+    tasks = [Task(f't{i}', (float(i), 0.0, 0.0), value=1e200, announced=-4e9) for i in range(4)]
+    found = quick([replace(ONE, range=2.5)], tasks, objective=objective)
+    assert found.routes['u1'] == ('t0', 't1', 't2')
+    assert (found.value, found.fit) == (pytest.approx(3e200), pytest.approx(0.02))
+    assert math.isfinite(found.response)
 
 
 def test_ids_are_used_once():

@@ -14,6 +14,7 @@ from uav_task_alloc.geometry.polyline import polyline_length
 Point = tuple[float, float, float]  # [m] ENU
 LONG = 4e9  # [s] bound of all finite times; a message holds 2.1e9
 LONGEST_SERVICE = 1e9  # [s] bound of the service time
+LARGEST_VALUE = 1e200  # so that sums over all tasks, and their products with times, stay finite
 _TASK_TIMES = (('earliest', -math.inf, LONG), ('latest', -LONG, math.inf),
                ('release', -LONG, LONG), ('announced', -LONG, LONG))  # [s]
 _TURN = 2.0 * math.pi
@@ -28,7 +29,7 @@ class Task:
     Attributes:
         id: unique.
         position: [m] ENU.
-        value: > 0; the sum over the tasks served is R of eq 2.12.
+        value: > 0, at most 1e200; the sum over the tasks served is R of eq 2.12.
         service_time: [s] spent at the position, in addition to the flight along the path.
         required_capabilities: a UAV needs all of them.
         allowed_uavs: ids of UAVs; None: any.
@@ -73,8 +74,9 @@ class Task:
         put = object.__setattr__
         put(self, 'position', check_point(place + 'position', self.position))
         put(self, 'value', check_number(place + 'value', self.value, 0.0, open_low=True))
-        if math.isinf(self.value):
-            raise InvalidValue(place + 'value', self.value, 'a finite number')
+        if self.value > LARGEST_VALUE:
+            raise InvalidValue(place + 'value', self.value, 'a finite number' if math.isinf(
+                self.value) else f'at most {LARGEST_VALUE:g}')
         put(self, 'service_time', check_number(place + 'service_time', self.service_time, 0.0,
                                                LONGEST_SERVICE))
         put(self, 'required_capabilities',
