@@ -40,3 +40,22 @@ def test_the_history_ends_with_the_fit_of_the_plan(objective, route_end, locked)
 def test_the_history_begins_with_an_infinite_fit_where_nothing_can_be_served():
     found = plan([Uav('u', (0.0, 0.0, 0.0), endurance=1.0)], [Task('t', (500.0, 0.0, 0.0))])
     assert [each for _, each in found.history] == [math.inf] == [found.fit]
+
+
+@pytest.mark.parametrize('hard_range', [True, False])
+@pytest.mark.parametrize('route_end', ['hold', 'home'])
+def test_what_a_uav_lacks_before_its_first_task_counts_only_where_it_has_tasks(
+        hard_range, route_end):
+    late = Uav('late', (900.0, 0.0, 50.0), home=(0.0, 900.0, 0.0), endurance=10.0,
+               available_from=40.0)  # in the air: it would wait there for longer than it can
+    task, far = Task('t', (50.0, 0.0, 50.0)), Task('far', (905.0, 0.0, 50.0))
+    options = {'objective': 'balanced', 'route_end': route_end, 'max_iterations': 50,
+               'budget': 60.0, 'trips': 2}
+    found = plan([Uav('u', (0.0, 0.0, 50.0)), late], [task, far], hard_range=hard_range, **options)
+    if hard_range:
+        assert (found.routes['late'], found.penalty) == ((), 0.0)
+    assert found.history[-1][1] == pytest.approx(found.fit, rel=1e-9)
+    for locked in ({}, {'late': ['far']}):
+        alone = plan([late], [far, task], hard_range=False, locked=locked, **options)
+        assert alone.penalty >= 30.0 * late.cruise_speed
+        assert alone.history[-1][1] == pytest.approx(alone.fit, rel=1e-9)
