@@ -56,7 +56,7 @@ zones = (st.builds(lambda c, r, g: ThreatZone.hemisphere('z', c, r, g), places, 
                      heights, margins)
          | st.builds(lambda v, h, g: ThreatZone.polygon('z', v, *h, g), corners, heights, margins))
 records = st.builds(lambda p, s, v: record('t', *p, state=s, value=v), places,
-                    st.sampled_from(TaskState), st.floats(5e-324, 1.7e308))
+                    st.sampled_from(TaskState), st.floats(5e-324, 1e200))
 lists = st.builds(
     lambda ways, returns: UavList('u1', 1, tuple(
         stop(f't{k}', *p, via=tuple(via)) for k, (p, via) in enumerate(ways)), returns),
