@@ -48,6 +48,28 @@ def test_a_vehicle_holds_says_where_and_flies_on_from_there(kind):
 
 
 @BOTH
+@pytest.mark.parametrize('source', ['operator', 'separation', 'shared id'])
+def test_a_command_of_mission_mode_that_was_lost_is_not_sent_again_in_a_hold(kind, source):
+    bench, lost = flying(kind, 'ABC'), [True]
+    bench.run(limit=1.0)
+    hold(bench)
+    assert bench.run(lambda: is_held(bench), 30.0)
+    place = bench.state().position
+    drop_messages(bench, 'up', 'COMMAND_LONG', lambda m: (
+        lost[0] and m.command == d.MAV_CMD_DO_SET_MODE))
+    hold(bench, GO_ON)
+    assert bench.run(lambda: bench.executor().sender.waits_for == 'mode mission', 20.0)
+    sent = len(bench.line.sent('COMMAND_LONG'))
+    lost[0] = False
+    hold(bench, HoldRequest(source, True, 'once more'))
+    bench.run(limit=20.0)
+    assert len(bench.line.sent('COMMAND_LONG')) == sent
+    assert math.dist(bench.state().position, place) < 3.0
+    hold(bench, HoldRequest(source, False))
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
+
+
+@BOTH
 def test_the_hold_is_sent_before_the_transfer_of_a_new_list(kind):
     bench = flying(kind, 'ABC')
     hold(bench)

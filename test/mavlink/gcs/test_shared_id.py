@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 from authority_bench import flying_with_pilot
+from findings_bench import drop_messages
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -12,6 +13,7 @@ from test_operator_hold import is_held
 from uav_task_alloc.mavlink.gcs.authority_state import AuthorityState
 from uav_task_alloc.mavlink.gcs.shared_id import hold_where_shared
 from uav_task_alloc.mavlink.gcs.status import UavMode
+from uav_task_alloc.mavlink.mission.upload_states import UploadState
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 SHARED = 'another node reports uav_1, too (states are published by /a and /b)'
@@ -51,6 +53,39 @@ def test_a_list_from_before_is_not_transferred(kind):
     assert len(bench.line.sent('MISSION_COUNT')) == sent
     share(bench, '')
     assert bench.run(lambda: bench.completed() == ['C', 'A', 'B'])
+
+
+@BOTH
+def test_a_list_from_before_is_not_transferred_in_the_climb(kind):
+    bench = FlightBench(kind).discover()
+    bench.assign(task_list('ABC'))
+    assert bench.run(lambda: bench.executor().sender.climbing and bench.onboard().verified())
+    sent = len(bench.line.sent('MISSION_COUNT'))
+    share(bench)
+    bench.assign(task_list('CAB', 2))
+    assert run_shared(bench, 60.0, lambda: is_held(bench))
+    run_shared(bench, 30.0)
+    assert is_held(bench)
+    assert len(bench.line.sent('MISSION_COUNT')) == sent
+    share(bench, '')
+    assert bench.run(lambda: bench.completed() == ['C', 'A', 'B'])
+
+
+@BOTH
+def test_an_upload_from_before_is_not_begun_again_until_its_id_is_its_own(kind):
+    bench, stalled = flying(kind, 'ABC'), [True]
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT', lambda m: stalled[0])
+    bench.run(limit=10.0)  # its link is good
+    bench.assign(task_list('CAB', 2))
+    assert bench.run(lambda: bench.onboard().upload.state is UploadState.SENDING, 30.0)
+    sent = len(bench.line.sent('MISSION_COUNT'))
+    run_shared(bench, 60.0)
+    stalled[0] = False
+    run_shared(bench, 60.0)
+    assert is_held(bench)
+    assert len(bench.line.sent('MISSION_COUNT')) == sent
+    share(bench, '')
+    assert bench.run(lambda: sorted(bench.completed()) == ['A', 'B', 'C'])
 
 
 @BOTH

@@ -45,6 +45,8 @@ class CommandSender:
         self.notes: deque[OperatorNote] = deque()
         self.waits_for = ''  # text on what the bridge waits for; '': nothing
         self.commanded: ModeFunction | None = None  # the latest mode set by the bridge
+        # False: it is to hold, and a command of mission mode is not sent again
+        self.may_start_mission: Callable[[], bool] = lambda: True
         self.must_start = False  # airborne and held by the bridge: set mission mode
         self.armed_here = False  # armed by the bridge, on the ground: take-off or disarm is next
         self.climbing = False  # by a take-off of the bridge
@@ -228,7 +230,9 @@ class CommandSender:
         self.started_mission = self.started_mission or mode is ModeFunction.MISSION
         return self.start(Command(_mode_name(mode), self._profile.mode_command(
             self._peer, mode), lambda: (
-                telemetry.mode is mode and not telemetry.arms_into_mission)), now, done)
+                telemetry.mode is mode and not telemetry.arms_into_mission),
+            wanted=lambda: mode is not ModeFunction.MISSION or self.may_start_mission()),
+            now, done)
 
     def set_current(self, seq: int, now: float, completion: _Completion) -> list[Message]:
         """Set the current mission item, by MISSION_SET_CURRENT if the command is unsupported.

@@ -124,7 +124,7 @@ class MissionExecutor:
             self._hold_first,
             self._end_of_list.held_too_long, self._settled, self.holds.stay,
             self._end_of_list.empty, self._end_of_list.given_up, self.fence.clear_way,
-            execution.update_mission, takeoff.take_off, execution.fly)
+            self.holds.update_mission, takeoff.take_off, execution.fly)
 
     @property
     def going_home(self) -> bool:

@@ -55,7 +55,7 @@ class HoldRule:
                  notes: deque[OperatorNote]) -> None:
         self._sender, self._telemetry, self._watch = sender, telemetry, watch
         self._profile, self._notes = profile, notes
-        self._onboard, self._update_mission = onboard, update_mission
+        self._onboard, self._update_list = onboard, update_mission
         self._requests: dict[str, HoldRequest] = {}  # in force, by source
         self._ordered_at: Point | None = None  # [m] where it was when the hold was ordered
         self._reported = False  # where it came to rest
@@ -64,6 +64,8 @@ class HoldRule:
         self._known: list[ThreatZone] = []  # without their margins, when that list came
         self._zone_ahead = ZoneAhead(telemetry, onboard, profile)
         onboard.upload.may_end = self._zone_ahead.may_take_upload
+        onboard.upload.may_retry = lambda: not self.for_shared_id
+        sender.may_start_mission = lambda: self._requests.keys() <= {_ZONE}
 
     @property
     def reason(self) -> str:
@@ -154,19 +156,20 @@ class HoldRule:
                                      'board'), now)
 
     def stay(self, now: float) -> NextMessages:
-        """Let the list be transferred while it holds, but no more; None: it is not to hold.
-
-        Where its id is shared the list may be that of the other one, and is not transferred.
-        """
+        """Let the list be transferred while it holds, but no more; None: it is not to hold."""
         if not self._requests or self._sender.climbing:
             return None
         stops = self._onboard.remaining().stops
         if self.at_zone and not stops:
             return None  # it holds, waits or returns by its list
-        out = self._update_mission(now) if stops and not self.for_shared_id else None
+        out = self.update_mission(now) if stops else None
         if out is not None:
             return out
         return self._sender.wait_for(f'the end of its hold ({self.reason})')
+
+    def update_mission(self, now: float) -> NextMessages:
+        """Transfer the list, but not while its id is shared: it may be that of the other one."""
+        return None if self.for_shared_id else self._update_list(now)
 
     def _log(self, text: str) -> None:
         if text != self._logged:

@@ -72,6 +72,7 @@ class Upload:
         self.events: deque[Outcome] = deque()
         self.uploads = 0  # started so far
         self.is_superseded: Callable[[], bool] = lambda: False  # it would not be retried unchanged
+        self.may_retry: Callable[[], bool] = lambda: True  # else it ends as a superseded one
         self.may_end: Callable[[], bool] = lambda: True  # its last item may be sent
         self.may_read: Callable[[], bool] = lambda: True  # its readback may begin
         # called with items read back that are not those accepted, and the time [s]
@@ -234,7 +235,8 @@ class Upload:
         if retries and self._tries >= _TRIES:
             self._fail(f'given up after {_TRIES} tries; last event: {event.value}')
             new = UploadState.IDLE
-        elif retries and self._tries and self.is_superseded():
+        elif retries and ((self._tries and self.is_superseded()) or (
+                event is not UploadEvent.START and not self.may_retry())):
             self._fail(SUPERSEDED)
             new = UploadState.IDLE
         elif retries:
