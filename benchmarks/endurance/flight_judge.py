@@ -22,8 +22,6 @@ SAME = 12.0  # [s] after a mode command of the bridge the same mode may be set b
 NEAR = 2.0  # [m] from a task: its item
 LEFT = 15.0  # [m] from a task: it has left
 STUCK = 60.0  # [s]
-# [s] the same where the mission was read back: PX4 begins anew at a request that came late
-STUCK_READING = 300.0
 PASSED = 1.5  # [s] around a set-current by another: what it crosses then may have been flown
 BEAT = 1.0  # [s] between heartbeats: a shorter mode is not reported
 SHOWN = 2.5  # [s] in which the link shows a mode: later it has changed in a cut
@@ -98,7 +96,7 @@ class Judge:
         self._unheld = False  # no heartbeat has shown that in time without a failsafe
         self._armed_for_it = False  # it was begun again by an arming: no mode hands it over
         self._avoids = False  # its autopilot avoids other traffic
-        self._stuck_since = self._moved_at = self._read_at = 0.0
+        self._stuck_since = self._moved_at = 0.0
         self._listed = world.tasks  # a new list begins a new transfer
 
     def handed_back(self, by_service: bool = False) -> None:
@@ -335,13 +333,7 @@ class Judge:
                  and world.now >= world.link.cut_until and not self.failing)
         if not ready or world.tasks is not self._listed:
             self._stuck_since, self._listed = world.now, world.tasks
-        since = max(self._stuck_since, self._moved_at)
-        if ready and world.reads_mission:
-            self._read_at = world.now
-            if world.now - since > STUCK:
-                self.counts['long_readbacks'] = 1  # once a flight
-        if (world.now - max(since, self._read_at) > STUCK
-                or world.now - since > STUCK_READING):
+        if world.now - max(self._stuck_since, self._moved_at) > STUCK:
             self._fault('held_forever', f'{flight.mode.name}, {world.state}')
             self._moved_at = math.inf  # once a flight
 

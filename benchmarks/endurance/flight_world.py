@@ -111,12 +111,6 @@ class World:
         return AuthorityState.UNKNOWN if authority is None or authority.undecided else (
             authority.state)
 
-    @property
-    def reads_mission(self) -> bool:
-        """Whether the bridge does not know the mission on board yet, and reads it."""
-        session = self.ground_station.sessions.get(1)
-        return session is not None and session.executor.onboard.held is None
-
     def assign(self, tasks: TaskList) -> None:
         """A list for the UAV, again after a restart of the bridge."""
         self.tasks, self._assigned = tasks, False

@@ -11,11 +11,8 @@ controls the aircraft, `completed` those of them that it reported. `flown_twice`
 flown again though a frame was delivered that shows that they were flown (see `flight_evidence`);
 `flown_again_unknowable` those of which no such frame was delivered; `flown_again_killed` those
 that others let a killed vehicle fly again before it was handed back, `flown_again_for_pilot`
-those of a complete mission that another began again (see `flight_judge`); `long_readbacks` the
-flights with a vehicle at rest for a minute while its mission was read back, which PX4 begins anew
-at a request that a link has delayed by two items: `held_forever` is then one of 5 minutes.
---ways 0.5 gives half of the tasks a way: reported without having been flown from end to end it is
-`false_completed`;
+those of a complete mission that another began again (see `flight_judge`). --ways 0.5 gives half
+of the tasks a way: reported without having been flown from end to end it is `false_completed`;
 `way_points_again` counts points of ways that were flown again, as after a doubt. `errors` are
 those that the bridge has caught, with which it has dropped a message or a list.
 --without-authority disables the table, to show that the check can fail. --json: the last line is

@@ -71,24 +71,6 @@ def judged(rows, hand_over_at=-1.0, late=0.0, kind='px4'):
     return judge.counts
 
 
-@pytest.mark.parametrize(('reads_until', 'seconds', 'counted'), [
-    (0, 62, (1, 0)), (61, 62, (0, 1)), (100, 160, (0, 1)), (100, 161, (1, 1)),
-    (400, 301, (1, 1)), (0, 60, (0, 0))])
-def test_a_vehicle_at_rest_is_held_for_ever_later_while_its_mission_is_read(
-        reads_until, seconds, counted):
-    flight = SimpleNamespace(custom_mode=0, track=None, mode=FlightMode.HOLD,
-                             body=SimpleNamespace(velocity=(0.0, 0.0, 0.0)))
-    world = SimpleNamespace(
-        now=0.0, vehicle=SimpleNamespace(flight=flight), state=None,
-        tasks=SimpleNamespace(stops=[SimpleNamespace(task=SimpleNamespace(id='A'))]),
-        authority=AuthorityState.HELD, link=SimpleNamespace(cut_until=0.0))
-    judge = Judge(world, 'px4', {'A': PLACE})
-    for world.now in range(seconds + 1):
-        world.reads_mission = world.now <= reads_until
-        judge._progress()
-    assert (judge.counts['held_forever'], judge.counts['long_readbacks']) == counted
-
-
 BY_LAND = [('mode', 'pilot', px4_mode(4, 6)), ('disarmed', 'pilot', None), ('mode', 'pilot', 0)]
 
 

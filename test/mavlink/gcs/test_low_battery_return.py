@@ -37,6 +37,12 @@ def returns(bench):
     return bench.state().mode in (UavMode.RETURNING, UavMode.LANDING)
 
 
+def is_left_alone(bench):
+    sent = len(bench.line.sent('COMMAND_LONG'))
+    run_shared(bench, 20.0)
+    assert len(bench.line.sent('COMMAND_LONG')) == sent
+
+
 @BOTH
 def test_it_returns_on_a_low_battery_and_lands(kind):
     bench = held_for_shared_id(kind)
@@ -148,9 +154,7 @@ def test_a_hold_of_an_operator_alone_is_no_reason_to_return(kind):
 def test_a_pilot_is_left_alone_on_a_low_battery(kind):
     bench = flying_with_pilot(kind)
     set_battery(bench, 0.1)
-    sent = len(bench.line.sent('COMMAND_LONG'))
-    run_shared(bench, 20.0)
-    assert len(bench.line.sent('COMMAND_LONG')) == sent
+    is_left_alone(bench)
 
 
 @BOTH
@@ -160,9 +164,7 @@ def test_a_pilot_who_takes_it_on_its_way_home_has_it(kind):
     assert run_shared(bench, 10.0, lambda: returns(bench))
     bench.vehicles[1].rc_mode({'ardupilot': 5, 'px4': 3 << 16}[kind])
     assert run_shared(bench, 10.0, lambda: bench.authority() is AuthorityState.LOST)
-    sent = len(bench.line.sent('COMMAND_LONG'))
-    run_shared(bench, 20.0)
-    assert len(bench.line.sent('COMMAND_LONG')) == sent
+    is_left_alone(bench)
 
 
 @BOTH
